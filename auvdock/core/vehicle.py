@@ -1,0 +1,199 @@
+"""A vehicle as data: published coefficients, hull and actuators, read from TOML.
+
+Coefficients keep the names, signs and axes in which they are published (SNAME 1950; Fossen 2011): body axes x forward,
+y starboard, z down, origin at the centre of buoyancy. The matrices that this module derives say in their names in
+which axes they are: `_marine` or `_body` (x forward, y port, z up).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from auvdock.assets import asset
+from auvdock.core.arrays import Array
+from auvdock.core.errors import ConfigError
+from auvdock.core.marine import flip_matrix, flip_twist, flip_vector
+from auvdock.core.strict import load_toml
+
+__all__ = ["ActuatorCfg", "MountCfg", "VehicleCfg", "load_vehicle"]
+
+_ROWS = {"X": 0, "Y": 1, "Z": 2, "K": 3, "M": 4, "N": 5}
+_COLUMNS = {"u": 0, "v": 1, "w": 2, "p": 3, "q": 4, "r": 5}
+_NAME = re.compile(r"^([XYZKMN])_(u)?([uvwpqr])(dot)?$|^([XYZKMN])_([uvwpqr])\6$")
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One hydrodynamic derivative with its unit and where it was published."""
+
+    name: str
+    """SNAME name, such as "Y_vdot", "X_uu", "N_uv"."""
+    value: float
+    """Value in the unit below, with the published sign."""
+    unit: str
+    """SI unit."""
+    source: str
+    """Author, year, table."""
+
+
+@dataclass(frozen=True)
+class ActuatorCfg:
+    """A thruster or a fin.
+
+    A thruster gives force = max_force_n × command along `direction` at `position_m`. A fin gives the wrench
+    `fin_wrench` × u |u| × angle, with angle = max_angle_rad × command.
+    """
+
+    name: str
+    """Unique name."""
+    kind: str
+    """"thruster" or "fin"."""
+    source: str
+    """Where its figures come from."""
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Marine axes."""
+    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    """Unit direction of positive thrust, marine axes."""
+    max_force_n: float = 0.0
+    """Thrust at command 1."""
+    time_constant_s: float = 0.1
+    """First-order lag."""
+    dead_band: float = 0.0
+    """Commands below this magnitude give nothing."""
+    max_angle_rad: float = 0.0
+    """Fin angle at command 1."""
+    fin_wrench: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Marine wrench for u |u| × angle = 1 (N s²/m² and N s²/m per rad)."""
+
+    def __post_init__(self) -> None:
+        """Check the kind."""
+        if self.kind not in ("thruster", "fin"):
+            raise ConfigError(f"actuators.{self.name}.kind", self.kind, "'thruster' or 'fin'")
+        if not self.time_constant_s > 0.0:
+            raise ConfigError(f"actuators.{self.name}.time_constant_s", self.time_constant_s, "a time above 0 s")
+
+
+@dataclass(frozen=True)
+class MountCfg:
+    """Where a camera sits; marine axes."""
+
+    position_m: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    up: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class VehicleCfg:
+    """Everything that is published of a vehicle and that its pilot may know."""
+
+    name: str
+    description: str
+    mass_kg: float
+    """Dry mass with enclosed water where the source counts it."""
+    inertia_kg_m2: tuple[float, float, float]
+    """Ixx, Iyy, Izz about the origin (centre of buoyancy)."""
+    centre_of_gravity_m: tuple[float, float, float]
+    """From the centre of buoyancy, marine axes: z down positive means stable."""
+    buoyancy_n: float
+    """Buoyant force; compare mass × 9.81."""
+    length_m: float
+    radius_m: float
+    nose_x_m: float
+    """Foremost point from the origin."""
+    tail_x_m: float
+    """Aftmost point from the origin (negative)."""
+    added_mass: tuple[Coefficient, ...]
+    """Derivatives such as X_udot: M_A[i, j] = -value."""
+    linear_damping: tuple[Coefficient, ...]
+    """Derivatives such as X_u: τ_i += value ν_j."""
+    quadratic_damping: tuple[Coefficient, ...]
+    """Derivatives such as X_uu, meant as X_u|u|: τ_i += value |ν_j| ν_j."""
+    lift_damping: tuple[Coefficient, ...]
+    """Body and fin lift such as Y_uv, without the Munk moment, which added-mass Coriolis gives: τ_i += value |u| ν_j."""
+    actuators: tuple[ActuatorCfg, ...]
+    bow_camera: MountCfg
+    belly_camera: MountCfg
+
+    @cached_property
+    def added_mass_body(self) -> Array:
+        """(6, 6) M_A about the origin, package body axes, symmetric."""
+        matrix = -_matrix(self.added_mass, "added_mass")
+        if not np.allclose(matrix, matrix.T, atol=1e-9):
+            raise ConfigError("added_mass", self.name, "a symmetric added-mass matrix")
+        return flip_matrix(matrix)
+
+    @cached_property
+    def linear_damping_body(self) -> Array:
+        """(6, 6) A with τ = A ν_r, package body axes."""
+        return flip_matrix(_matrix(self.linear_damping, "linear_damping"))
+
+    @cached_property
+    def quadratic_damping_body(self) -> Array:
+        """(6, 6) A with τ = A (|ν_r| ∘ ν_r), package body axes."""
+        return flip_matrix(_matrix(self.quadratic_damping, "quadratic_damping"))
+
+    @cached_property
+    def lift_damping_body(self) -> Array:
+        """(6, 6) A with τ = |u| A ν_r, package body axes."""
+        return flip_matrix(_matrix(self.lift_damping, "lift_damping"))
+
+    @cached_property
+    def rigid_body_mass_body(self) -> Array:
+        """(6, 6) M_RB about the origin, package body axes (Fossen 2011, equation 3.44)."""
+        m = self.mass_kg
+        x, y, z = (float(part) for part in self.centre_of_gravity_body_m)
+        skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        matrix = np.zeros((6, 6))
+        matrix[:3, :3] = m * np.eye(3)
+        matrix[:3, 3:] = -m * skew
+        matrix[3:, :3] = m * skew
+        matrix[3:, 3:] = np.diag(self.inertia_kg_m2)
+        return matrix
+
+    @cached_property
+    def centre_of_gravity_body_m(self) -> Array:
+        """(3,) centre of gravity from the origin, package body axes."""
+        return flip_vector(np.array(self.centre_of_gravity_m))
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        """Names in the order of `Command.values`."""
+        return tuple(actuator.name for actuator in self.actuators)
+
+    @cached_property
+    def thruster_wrenches_body(self) -> Array:
+        """(6, n) wrench of each actuator at command 1, package body axes; a fin's column is for u |u| = 1 m²/s²."""
+        columns: list[Array] = []
+        for actuator in self.actuators:
+            if actuator.kind == "thruster":
+                force = np.array(actuator.direction) * actuator.max_force_n
+                wrench = np.concatenate([force, np.cross(np.array(actuator.position_m), force)])
+            else:
+                wrench = np.array(actuator.fin_wrench) * actuator.max_angle_rad
+            columns.append(flip_twist(wrench))
+        return np.column_stack(columns)
+
+
+def load_vehicle(name: str) -> VehicleCfg:
+    """A vehicle preset by name.
+
+    Raises:
+        ConfigError: no such preset, or a file that does not fit.
+    """
+    return load_toml(VehicleCfg, asset("vehicles", name))
+
+
+def _matrix(coefficients: tuple[Coefficient, ...], field: str) -> Array:
+    matrix = np.zeros((6, 6))
+    for coefficient in coefficients:
+        match = _NAME.match(coefficient.name)
+        if match is None or not math.isfinite(coefficient.value):
+            raise ConfigError(field, coefficient.name, "a SNAME derivative such as Y_vdot, X_u, Y_vv or N_uv")
+        row, column = (match[1], match[3]) if match[1] else (match[5], match[6])
+        matrix[_ROWS[row], _COLUMNS[column]] += coefficient.value
+    return matrix
