@@ -106,9 +106,8 @@ class Camera:
         """Undistorted normalised image coordinates (n, 2) of pixels (n, 2): x/z and y/z of the ray."""
         if len(pixels) == 0:
             return np.zeros((0, 2))
-        return cv2.undistortPoints(
-            np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2), self.matrix, self.distortion
-        ).reshape(-1, 2)
+        points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
+        return np.asarray(cv2.undistortPoints(points, self.matrix, self.distortion), dtype=np.float64).reshape(-1, 2)
 
     def rays(self, pixels: Array) -> Array:
         """Unit rays (n, 3) in the camera frame through pixels (n, 2)."""

@@ -114,7 +114,7 @@ class VehicleCfg:
     quadratic_damping: tuple[Coefficient, ...]
     """Derivatives such as X_uu, meant as X_u|u|: τ_i += value |ν_j| ν_j."""
     lift_damping: tuple[Coefficient, ...]
-    """Body and fin lift such as Y_uv, without the Munk moment, which added-mass Coriolis gives: τ_i += value |u| ν_j."""
+    """Body and fin lift such as Y_uv: τ_i += value |u| ν_j. The Munk moment is not in it: M_A's Coriolis gives that."""
     actuators: tuple[ActuatorCfg, ...]
     bow_camera: MountCfg
     belly_camera: MountCfg
