@@ -1,0 +1,69 @@
+"""What an episode leaves behind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from auvdock.core.strict import to_plain
+
+__all__ = ["FAILURE_REASONS", "EpisodeResult"]
+
+FAILURE_REASONS = ("search", "far", "mid", "near", "terminal", "collision", "timeout", "diverged", "interrupted")
+"""Why an episode failed: the guidance stage in which the pilot gave up or time ran out, or what ended it.
+
+`search` to `terminal`: the pilot gave up, or time ran out, in that stage. `collision`: a contact harder than the
+vehicle's structure bears. `timeout`: time ran out while backing off for another attempt. `diverged`: the simulation's
+state became absurd. `interrupted`: the user stopped it.
+"""
+
+
+@dataclass(frozen=True)
+class EpisodeResult:
+    """Outcome and metrics of one episode; NaN never appears, None stands for "did not happen"."""
+
+    success: bool
+    """The latch has closed and held, within the entry limits (`auvdock.core.station.LatchCfg`)."""
+    failure_reason: str | None
+    """One of `FAILURE_REASONS`, None on success."""
+    distortion_rate: float | None
+    """invalid_frames / precise_frames (paper A, table 10); None if precise guidance was never entered."""
+    precise_frames: int
+    """Frames in precise guidance: from the first measured pose until the array leaves the camera's view near by."""
+    invalid_frames: int
+    """Those of them without a pose measured in that frame."""
+    entry_distance_m: float | None
+    """Distance from the mouth along the approach axis at the first measured pose (paper A, table 9)."""
+    precise_range_m: float | None
+    """From there to the last measured pose: total range of precise guidance (paper A, table 9)."""
+    time_s: float
+    path_length_m: float
+    energy_j: float
+    """Work done by thrusters and fins' lag on the water's side: ∫ Σ |thrust × advance or swept power| dt, see `sim`."""
+    peak_contact_force_n: float
+    lateral_error_m: float | None
+    """Sideways distance of the nose from the tube's axis as it crosses the throat, or the mouth if it got no further."""
+    vertical_error_m: float | None
+    heading_error_rad: float | None
+    """Angle between hull and tube axis at the same moment."""
+    entry_speed_m_s: float | None
+    """Speed along the axis as the nose crosses the throat."""
+    pose_error_median_m: float | None
+    """Median distance between measured and true camera position in precise guidance."""
+    attempts: int
+    """Approaches begun; 1 means no go-around."""
+    seed: int
+    wall_s: float
+    """Wall-clock time; the only field, with real_time_factor, that differs between two runs of one seed."""
+    real_time_factor: float
+    versions: Mapping[str, str]
+    """auvdock, mujoco, numpy, opencv and Python versions."""
+    config: Mapping[str, Any]
+    """The resolved configuration."""
+
+    WALL_CLOCK_FIELDS = ("wall_s", "real_time_factor")
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for `json.dumps`."""
+        return {field.name: to_plain(getattr(self, field.name)) for field in fields(self)}

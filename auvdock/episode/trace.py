@@ -1,0 +1,78 @@
+"""What an episode shows to whoever watches it: recorders, progress displays, plots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from auvdock.core.arrays import Array, Image
+from auvdock.core.camera import Camera
+from auvdock.core.contracts import Command, Percept, Proprioception
+from auvdock.core.station import ConicalStationCfg
+from auvdock.core.vehicle import VehicleCfg
+from auvdock.episode.result import EpisodeResult
+from auvdock.sim.truth import Truth
+
+__all__ = ["EpisodeObserver", "EpisodeSetup", "Tick"]
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeSetup:
+    """What stays the same for a whole episode.
+
+    Attributes:
+        title: station, seed and fidelity in a few words.
+        station: the station with its lights.
+        vehicle: the vehicle.
+        camera: the camera that the pilot looks through.
+        T_world_station: (4, 4).
+        detector: name of the detector.
+        water: name of the water.
+    """
+
+    title: str
+    station: ConicalStationCfg
+    vehicle: VehicleCfg
+    camera: Camera
+    T_world_station: Array
+    detector: str
+    water: str
+
+
+@dataclass(frozen=True, eq=False)
+class Tick:
+    """One control period.
+
+    Attributes:
+        truth: the simulator's state; for the log only, the pilot never sees it.
+        proprioception: what the vehicle's own sensors said.
+        image: (H, W, 3) uint8 RGB if a frame was rendered in this period, else None.
+        percept: what perception made of this period's frame, None if there was no frame.
+        command: what the pilot gave.
+    """
+
+    truth: Truth
+    proprioception: Proprioception
+    image: Image | None
+    percept: Percept | None
+    command: Command
+
+
+class EpisodeObserver(Protocol):
+    """Watches an episode."""
+
+    def on_start(self, setup: EpisodeSetup) -> None:
+        """Called once, before the first tick."""
+        ...
+
+    def on_tick(self, tick: Tick) -> None:
+        """Called after each control period."""
+        ...
+
+    def on_end(self, result: EpisodeResult) -> None:
+        """Called once, however the episode ended."""
+        ...
+
+    def close(self) -> None:
+        """Release files; called even if the episode was interrupted."""
+        ...
