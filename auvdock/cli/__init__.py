@@ -1,1 +1,5 @@
-"""auvdock.cli."""
+"""The command line; the only room that prints."""
+
+from auvdock.cli.main import main
+
+__all__ = ["main"]

@@ -1,0 +1,7 @@
+"""`python -m auvdock.cli`."""
+
+import sys
+
+from auvdock.cli.main import main
+
+sys.exit(main())

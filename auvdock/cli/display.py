@@ -1,0 +1,103 @@
+"""What a person sees while an episode runs and when it is over."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from auvdock.episode.result import EpisodeResult
+from auvdock.episode.trace import EpisodeSetup, Tick
+
+__all__ = ["ProgressDisplay", "print_result"]
+
+PLAIN_EVERY_S = 10.0
+"""Simulated time between progress lines where the output is no terminal."""
+
+
+class ProgressDisplay:
+    """A live line: distance made good, mode, range, speed. Plain lines where standard error is no terminal."""
+
+    def __init__(self, max_time_s: float) -> None:
+        """Prepare; nothing is shown before the episode starts."""
+        self._console = Console(stderr=True)
+        self._max_time_s = max_time_s
+        self._progress: Progress | None = None
+        self._start_range_m: float | None = None
+        self._next_plain_s = 0.0
+
+    def on_start(self, setup: EpisodeSetup) -> None:
+        """Show the title."""
+        self._console.print(f"auvdock: {setup.title}, water {setup.water}, detector {setup.detector}")
+        if self._console.is_terminal:
+            columns = (TextColumn("{task.description}"), BarColumn(40), TimeElapsedColumn())
+            self._progress = Progress(*columns, console=self._console, transient=True)
+            self._progress.add_task("starting", total=1.0)
+            self._progress.start()
+
+    def on_tick(self, tick: Tick) -> None:
+        """Update the line."""
+        range_m = float(tick.truth.nose_station_m[0])
+        if self._start_range_m is None:
+            self._start_range_m = range_m
+        speed_m_s = math.hypot(*(float(part) for part in tick.truth.nu_body[:3]))
+        line = f"t {tick.truth.time_s:5.1f} s  {tick.command.mode:8s} range {range_m:5.1f} m  {speed_m_s:4.2f} m/s"
+        if self._progress is not None:
+            done = 1.0 - max(0.0, range_m + 1.7) / (self._start_range_m + 1.7)
+            self._progress.update(self._progress.task_ids[0], description=line, completed=max(0.0, done))
+        elif tick.truth.time_s >= self._next_plain_s:
+            self._next_plain_s += PLAIN_EVERY_S
+            self._console.print(line, highlight=False)
+
+    def on_end(self, result: EpisodeResult) -> None:
+        """Nothing: the table comes last."""
+
+    def close(self) -> None:
+        """Take the live line away."""
+        if self._progress is not None:
+            self._progress.stop()
+            self._progress = None
+
+
+def print_result(result: EpisodeResult, record: Path | None) -> None:
+    """The result as a table on standard output."""
+    console = Console()
+    table = Table(title=f"conical docking, seed {result.seed}", title_justify="left")
+    table.add_column("metric")
+    table.add_column("value", justify="right")
+    verdict = "[green]docked[/green]" if result.success else f"[red]failed: {result.failure_reason}[/red]"
+    table.add_row("outcome", verdict)
+    rows: list[tuple[str, float | int | None, str]] = [
+        ("time", result.time_s, "{:.1f} s"),
+        ("path length", result.path_length_m, "{:.1f} m"),
+        ("thruster work", result.energy_j, "{:.0f} J"),
+        ("entry distance (first pose)", result.entry_distance_m, "{:.1f} m"),
+        ("precise-guidance range", result.precise_range_m, "{:.1f} m"),
+        ("precise frames", result.precise_frames, "{:d}"),
+        ("invalid frames", result.invalid_frames, "{:d}"),
+        ("distortion rate", _percent(result.distortion_rate), "{:.2f} %"),
+        ("median pose error", result.pose_error_median_m, "{:.3f} m"),
+        ("lateral error at entry", result.lateral_error_m, "{:+.3f} m"),
+        ("heading error at entry", _degrees(result.heading_error_rad), "{:.1f}°"),
+        ("entry speed", result.entry_speed_m_s, "{:.2f} m/s"),
+        ("peak contact force", result.peak_contact_force_n, "{:.0f} N"),
+        ("approaches", result.attempts, "{:d}"),
+        ("wall-clock time", result.wall_s, "{:.1f} s"),
+        ("real-time factor", result.real_time_factor, "{:.1f} x"),
+    ]
+    for name, value, form in rows:
+        table.add_row(name, "-" if value is None else form.format(value))
+    console.print(table)
+    if record is not None:
+        console.print(f"recording: {record}   (auvdock view {record})", highlight=False)
+
+
+def _percent(value: float | None) -> float | None:
+    return None if value is None else 100.0 * value
+
+
+def _degrees(value: float | None) -> float | None:
+    return None if value is None else math.degrees(value)

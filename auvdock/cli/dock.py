@@ -1,0 +1,115 @@
+"""`auvdock dock conical`: one episode with live progress, a result table, a recording or JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from auvdock.cli.display import ProgressDisplay, print_result
+from auvdock.cli.parsing import base_config, parse
+from auvdock.core.errors import ConfigError
+from auvdock.episode.config import EpisodeCfg
+from auvdock.episode.runner import EpisodeRunner
+from auvdock.episode.trace import EpisodeObserver
+
+__all__ = ["DockConical", "run_conical"]
+
+
+@dataclass(frozen=True)
+class DockConical:
+    """Dock into the conical station: one episode.
+
+    Exit code: 0 docked, 1 not docked, 2 input that cannot be used.
+    """
+
+    seed: int = 0
+    """Decides start, current, sensor noise and camera noise."""
+    fidelity: Literal["pixels", "beacons"] | None = None
+    """pixels renders every frame; beacons draws detections from the same light model without an image."""
+    detector: str | None = None
+    """threshold, blob, or your own as package.module:Name."""
+    water: str | None = None
+    """Water preset: I, IA, IB, II, III, 1C to 9C, clear, pool, lake."""
+    attenuation: float | None = None
+    """Beam attenuation at 450 nm in 1/m, in place of the preset's."""
+    current: float | None = None
+    """Speed of the current in m/s."""
+    current_direction: str | None = None
+    """Where the current flows to, degrees counter-clockwise from the approach axis seen from above, or "random"."""
+    level: int = 1
+    """Difficulty 0 to 4; the flags change single things of it."""
+    config: Path | None = None
+    """TOML file with further settings, on top of the level."""
+    record: Path | None = None
+    """Write a Rerun recording here."""
+    json: bool = False
+    """Print the result as one JSON object and nothing else."""
+    episode: Annotated[EpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=EpisodeCfg)
+
+    def resolve(self) -> EpisodeCfg:
+        """The configuration with the common flags applied.
+
+        Raises:
+            ConfigError: a value that does not fit.
+        """
+        changes: dict[str, Any] = {}
+        world: dict[str, Any] = changes.setdefault("world", {})
+        if self.fidelity is not None:
+            world["fidelity"] = self.fidelity
+        if self.water is not None:
+            world["water"] = self.water
+        if self.attenuation is not None:
+            world["attenuation_per_m"] = _finite("attenuation", self.attenuation, "a finite attenuation in 1/m")
+        if self.current is not None:
+            speed = _finite("current", self.current, "a finite speed in m/s")
+            world.setdefault("sim", {}).setdefault("current", {})["speed_m_s"] = speed
+        if self.current_direction is not None:
+            start = world.setdefault("start", {})
+            start["random_current_direction"] = self.current_direction == "random"
+            if self.current_direction != "random":
+                degrees = _degrees(self.current_direction)
+                world.setdefault("sim", {}).setdefault("current", {})["direction_deg"] = degrees
+        if self.detector is not None:
+            changes["perception"] = {"detector": self.detector}
+        return self.episode.override(changes)
+
+
+def run_conical(argv: Sequence[str], prog: str) -> int:
+    """Run the command."""
+    default = DockConical(episode=base_config(argv)) if not {"-h", "--help"} & set(argv) else DockConical()
+    args = parse(DockConical, argv, prog, default)
+    if args.seed < 0:
+        raise ConfigError("seed", args.seed, "a whole number of 0 or more")
+    runner = EpisodeRunner(args.resolve())
+    observers: list[EpisodeObserver] = []
+    if args.record is not None:
+        from auvdock.recording.rerun_recorder import RerunRecorder
+
+        observers.append(RerunRecorder(args.record))
+    if not args.json:
+        observers.append(ProgressDisplay(runner.cfg.world.limits.max_time_s))
+    result = runner.run(args.seed, observers)
+    if args.json:
+        print(json.dumps(result.to_json(), allow_nan=False))
+    else:
+        print_result(result, args.record)
+    return 0 if result.success else 1
+
+
+def _finite(name: str, value: float, remedy: str) -> float:
+    if not math.isfinite(value):
+        raise ConfigError(name, value, remedy)
+    return value
+
+
+def _degrees(text: str) -> float:
+    try:
+        return _finite("current-direction", float(text), "degrees or 'random'")
+    except ValueError as error:
+        raise ConfigError("current-direction", text, "degrees or 'random'") from error

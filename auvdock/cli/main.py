@@ -1,0 +1,70 @@
+"""`auvdock COMMAND ...`: finds the command, runs it, turns errors that a user can mend into one line and exit code 2."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+
+from auvdock.core.errors import AuvdockError
+
+__all__ = ["COMMANDS", "main"]
+
+COMMANDS = {
+    ("dock", "conical"): ("auvdock.cli.dock:run_conical", "dock into the conical station, one episode"),
+    ("view",): ("auvdock.cli.view:run", "open a recording in the Rerun viewer"),
+    ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
+    ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
+    ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),
+}
+"""Words of a command: where it lives (imported only when asked for) and what it does."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command line.
+
+    Returns:
+        0 on success, 1 if an episode failed to dock, 2 on input that cannot be used, 130 if interrupted.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        command = _find(words)
+        if command is None:
+            return _usage(words)
+        module, function = COMMANDS[command][0].split(":")
+        run: Callable[[Sequence[str], str], int] = getattr(import_module(module), function)
+        return run(words[len(command) :], "auvdock " + " ".join(command))
+    except AuvdockError as error:
+        print(f"auvdock: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("auvdock: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 141
+
+
+def _find(words: Sequence[str]) -> tuple[str, ...] | None:
+    for command in COMMANDS:
+        if tuple(words[: len(command)]) == command:
+            return command
+    return None
+
+
+def _usage(words: Sequence[str]) -> int:
+    asked = bool(words) and words[0] in ("-h", "--help")
+    out = sys.stdout if asked else sys.stderr
+    if words and words[0] == "--version":
+        from auvdock import __version__
+
+        print(__version__)
+        return 0
+    if words and not asked:
+        known = ", ".join(" ".join(command) for command in COMMANDS)
+        print(f"auvdock: error: command: {' '.join(words[:2])!r} is unknown; give one of: {known}", file=out)
+        return 2
+    print("usage: auvdock COMMAND [--help] ...\n", file=out)
+    for command, (_, summary) in COMMANDS.items():
+        print(f"  {' '.join(command):14s} {summary}", file=out)
+    return 0 if asked else 2

@@ -1,0 +1,46 @@
+"""Parsing of flags: tyro over frozen dataclasses, with a level or a TOML file as the defaults beneath the flags."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import tyro
+
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import read_toml
+from auvdock.episode.config import EpisodeCfg, level_cfg
+
+__all__ = ["base_config", "parse"]
+
+T = TypeVar("T")
+
+DEFAULT_LEVEL = 1
+
+
+def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None) -> T:
+    """Fill the dataclass `cls` from flags; wrong flags end the program with exit code 2, as argparse's do."""
+    doc = (cls.__doc__ or "").strip()
+    if default is None:
+        return tyro.cli(cls, args=list(argv), prog=prog, description=doc)
+    return tyro.cli(cls, args=list(argv), prog=prog, description=doc, default=default)
+
+
+def base_config(argv: Sequence[str]) -> EpisodeCfg:
+    """The configuration that `--level N` and `--config FILE` ask for; other flags then change single fields of it.
+
+    Raises:
+        ConfigError: no such level, or a file that does not fit.
+    """
+    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    finder.add_argument("--level", default=str(DEFAULT_LEVEL))
+    finder.add_argument("--config", default=None)
+    found, _ = finder.parse_known_args(list(argv))
+    try:
+        level = int(found.level)
+    except ValueError as error:
+        raise ConfigError("level", found.level, "a whole number of 0 to 4") from error
+    cfg = level_cfg(level)
+    return cfg.override(read_toml(Path(found.config))) if found.config else cfg

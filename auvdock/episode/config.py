@@ -1,0 +1,47 @@
+"""Configuration of an episode: the world and the pilot's head; difficulty levels as TOML on top."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from auvdock.assets import asset
+from auvdock.controllers.pilot import ControlCfg
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import merge, read_toml
+from auvdock.envs.config import WorldCfg
+from auvdock.perception.pipeline import PerceptionCfg
+
+__all__ = ["LEVELS", "EpisodeCfg", "level_cfg"]
+
+LEVELS = (0, 1, 2, 3, 4)
+"""Difficulty levels; `assets/levels/level_N.toml` says what each changes."""
+
+
+@dataclass(frozen=True)
+class EpisodeCfg:
+    """One docking episode."""
+
+    world: WorldCfg = WorldCfg()
+    perception: PerceptionCfg = PerceptionCfg()
+    control: ControlCfg = ControlCfg()
+
+    def override(self, changes: Mapping[str, Any]) -> EpisodeCfg:
+        """A copy with nested fields replaced, checked as strictly as a TOML file.
+
+        Raises:
+            ConfigError: an unknown key or a value that does not fit.
+        """
+        return merge(self, changes)
+
+
+def level_cfg(level: int) -> EpisodeCfg:
+    """The configuration of a difficulty level.
+
+    Raises:
+        ConfigError: no such level.
+    """
+    if level not in LEVELS:
+        raise ConfigError("level", level, f"one of {', '.join(map(str, LEVELS))}")
+    return EpisodeCfg().override(read_toml(asset("levels", f"level_{level}")))

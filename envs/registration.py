@@ -1,0 +1,16 @@
+"""Registers the environments with Gymnasium; called by Gymnasium itself through the package's entry point."""
+
+from __future__ import annotations
+
+import gymnasium
+
+__all__ = ["register_envs"]
+
+
+def register_envs() -> None:
+    """Register `auvdock/ConicalDocking-v0`; doing it twice changes nothing.
+
+    Time limits are the environment's own (`WorldCfg.limits.max_time_s`), so no `max_episode_steps` is set.
+    """
+    if "auvdock/ConicalDocking-v0" not in gymnasium.registry:
+        gymnasium.register(id="auvdock/ConicalDocking-v0", entry_point="auvdock.envs.docking:DockingEnv")
