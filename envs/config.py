@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from auvdock.core.camera import CameraCfg
 from auvdock.core.errors import ConfigError
@@ -70,7 +70,7 @@ class WorldCfg:
     """Water preset: Jerlov "I" to "9C", "clear", "pool", "lake"."""
     attenuation_per_m: float | None = None
     """Beam attenuation c at 450 nm in 1/m in place of the preset's."""
-    station: ConicalStationCfg = load_conical_station()
+    station: ConicalStationCfg = field(default_factory=load_conical_station)
     sim: SimCfg = SimCfg()
     camera: CameraCfg = CameraCfg()
     imaging: ImagingCfg = ImagingCfg()

@@ -70,7 +70,14 @@ class DockingWorld:
         self.water = load_water(cfg.water)
         if cfg.attenuation_per_m is not None:
             self.water = with_attenuation(self.water, cfg.attenuation_per_m)
-        optics = (self.camera, self.water, cfg.station.layout, cfg.nuisance, cfg.imaging, self.simulator.T_world_station)
+        optics = (
+            self.camera,
+            self.water,
+            cfg.station.layout,
+            cfg.nuisance,
+            cfg.imaging,
+            self.simulator.T_world_station,
+        )
         self.imager = UnderwaterCamera(*optics, scene=self.simulator)
         self._beacon_sensor = BeaconSensor(*optics, detector) if cfg.fidelity == "beacons" else None
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)

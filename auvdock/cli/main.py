@@ -1,4 +1,4 @@
-"""`auvdock COMMAND ...`: finds the command, runs it, turns errors that a user can mend into one line and exit code 2."""
+"""`auvdock COMMAND ...`: finds and runs the command; what a user can mend becomes one line and exit code 2."""
 
 from __future__ import annotations
 

@@ -107,7 +107,9 @@ class Camera:
         if len(pixels) == 0:
             return np.zeros((0, 2))
         points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
-        return np.asarray(cv2.undistortPoints(points, self.matrix, self.distortion), dtype=np.float64).reshape(-1, 2)
+        accuracy = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
+        undistorted = cv2.undistortPoints(points, self.matrix, self.distortion, criteria=accuracy)
+        return np.asarray(undistorted, dtype=np.float64).reshape(-1, 2)
 
     def rays(self, pixels: Array) -> Array:
         """Unit rays (n, 3) in the camera frame through pixels (n, 2)."""

@@ -109,7 +109,7 @@ def _convert(hint: Any, value: Any, field: str) -> Any:  # noqa: ANN401
     try:
         converted: Any = from_mapping(box, {"value": value})
     except ConfigError as error:
-        raise ConfigError(field, value, error.remedy) from error
+        raise ConfigError(field + error.field.removeprefix("value"), error.value, error.remedy) from error
     return converted.value
 
 
@@ -127,6 +127,8 @@ def _check_keys(cls: Any, data: Any, prefix: str) -> None:  # noqa: ANN401
 
 
 def _check_nested(hint: Any, value: Any, path: str) -> None:  # noqa: ANN401
+    if isinstance(value, bool) and hint is int:
+        raise ConfigError(path, value, "a whole number")  # Python counts True as 1
     if dataclasses.is_dataclass(hint):
         _check_keys(hint, value, f"{path}.")
     elif get_origin(hint) in (tuple, list) and isinstance(value, tuple | list):

@@ -43,7 +43,7 @@ class EpisodeResult:
     """Work done by thrusters and fins' lag on the water's side: ∫ Σ |thrust × advance or swept power| dt, see `sim`."""
     peak_contact_force_n: float
     lateral_error_m: float | None
-    """Sideways distance of the nose from the tube's axis as it crosses the throat, or the mouth if it got no further."""
+    """Sideways distance of the nose from the tube's axis as it crosses the throat; positive is +y of the station."""
     vertical_error_m: float | None
     heading_error_rad: float | None
     """Angle between hull and tube axis at the same moment."""

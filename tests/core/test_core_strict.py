@@ -1,0 +1,87 @@
+"""Strict configuration: nothing unknown, nothing of the wrong type, nothing non-finite gets in."""
+
+import pickle
+from dataclasses import dataclass
+
+import pytest
+
+from auvdock.assets import asset, asset_names
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import from_mapping, load_toml, merge, read_toml, to_plain
+
+
+@dataclass(frozen=True)
+class Inner:
+    speed_m_s: float = 1.0
+    name: str = "a"
+
+
+@dataclass(frozen=True)
+class Outer:
+    inner: Inner = Inner()
+    items: tuple[Inner, ...] = ()
+    limit: float | None = None
+    count: int = 1
+
+
+def test_whole_numbers_become_floats_and_lists_become_tuples():
+    outer = from_mapping(Outer, {"inner": {"speed_m_s": 2}, "items": [{"name": "b"}], "limit": 3})
+    assert outer == Outer(Inner(2.0), (Inner(1.0, "b"),), 3.0)
+    assert isinstance(outer.inner.speed_m_s, float)
+
+
+@pytest.mark.parametrize(
+    ("data", "field"),
+    [
+        ({"inner": {"speed": 1.0}}, "inner.speed"),
+        ({"items": [{"nmae": "b"}]}, r"items\[0\].nmae"),
+        ({"cuont": 1}, "cuont"),
+        ({"inner": {"speed_m_s": "fast"}}, "inner.speed_m_s"),
+        ({"inner": {"speed_m_s": float("nan")}}, "inner.speed_m_s"),
+        ({"inner": {"speed_m_s": float("inf")}}, "inner.speed_m_s"),
+        ({"count": True}, "count"),
+        ({"count": 1.5}, "count"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(data, field):
+    with pytest.raises(ConfigError, match=field):
+        from_mapping(Outer, data)
+    with pytest.raises(ConfigError, match=field):
+        merge(Outer(), data)
+
+
+def test_unknown_key_names_the_nearest_known_one():
+    with pytest.raises(ConfigError, match="count"):
+        from_mapping(Outer, {"cuont": 1})
+
+
+def test_merge_changes_only_what_it_is_told():
+    base = Outer(Inner(2.0, "x"), (Inner(),), 4.0, 7)
+    merged = merge(base, {"inner": {"name": "y"}})
+    assert merged == Outer(Inner(2.0, "y"), (Inner(),), 4.0, 7)
+    assert merge(base, to_plain(base)) == base
+
+
+def test_corrupt_and_missing_files_are_named(tmp_path):
+    corrupt = tmp_path / "corrupt.toml"
+    corrupt.write_text("speed = = 1", encoding="utf-8")
+    for path in (corrupt, tmp_path / "missing.toml"):
+        with pytest.raises(ConfigError, match=path.name):
+            read_toml(path)
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match="binary"):
+        load_toml(Outer, binary)
+
+
+def test_unknown_preset_lists_those_that_exist():
+    with pytest.raises(ConfigError, match="remus_hybrid"):
+        asset("vehicles", "remus_hybird")
+    assert "conical" in asset_names("stations")
+
+
+def test_errors_survive_pickling():
+    error = ConfigError("field", 3, "a number")
+    copy = pickle.loads(pickle.dumps(error))
+    assert str(copy) == str(error)
+    assert copy.field == "field"

@@ -1,0 +1,125 @@
+"""Whole episodes in the `beacons` fidelity: determinism, bookkeeping, failure causes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from auvdock.episode.config import LEVELS, EpisodeCfg, level_cfg
+from auvdock.episode.result import FAILURE_REASONS, EpisodeResult
+from auvdock.episode.runner import EpisodeRunner
+
+KEYS = (
+    "success failure_reason distortion_rate precise_frames invalid_frames entry_distance_m precise_range_m time_s "
+    "path_length_m energy_j peak_contact_force_n lateral_error_m heading_error_rad seed config"
+).split()
+
+
+def beacons(**world):
+    return level_cfg(1).override({"world": {"fidelity": "beacons", **world}})
+
+
+def comparable(result):
+    plain = result.to_json()
+    return {key: value for key, value in plain.items() if key not in EpisodeResult.WALL_CLOCK_FIELDS}
+
+
+def test_an_episode_docks_and_tells_its_metrics():
+    result = EpisodeRunner(beacons()).run(0)
+    assert result.success, result.failure_reason
+    plain = result.to_json()
+    assert set(KEYS) <= set(plain)
+    json.dumps(plain, allow_nan=False)
+    assert result.invalid_frames <= result.precise_frames
+    assert result.distortion_rate == pytest.approx(result.invalid_frames / result.precise_frames)
+    assert 5.0 < result.entry_distance_m < 31.0
+    assert result.path_length_m >= result.entry_distance_m
+    assert result.energy_j > 0.0
+    assert abs(result.lateral_error_m) < 0.15
+
+
+def test_same_seed_same_result_in_a_used_runner_and_in_another_process():
+    runner = EpisodeRunner(beacons())
+    first = comparable(runner.run(7))
+    runner.run(8)
+    assert comparable(runner.run(7)) == first
+    words = ["dock", "conical", "--fidelity", "beacons", "--seed", "7", "--json"]
+    done = subprocess.run([sys.executable, "-m", "auvdock.cli", *words], capture_output=True, text=True, check=False)
+    other = json.loads(done.stdout)
+    assert {key: value for key, value in other.items() if key not in EpisodeResult.WALL_CLOCK_FIELDS} == first
+
+
+@pytest.mark.render
+def test_same_seed_same_result_in_pixels():
+    cfg = level_cfg(1).override({"world": {"limits": {"max_time_s": 4.0}}})
+    assert comparable(EpisodeRunner(cfg).run(3)) == comparable(EpisodeRunner(cfg).run(3))
+
+
+def test_different_seeds_differ():
+    runner = EpisodeRunner(beacons(limits={"max_time_s": 3.0}))
+    assert comparable(runner.run(1)) != comparable(runner.run(2))
+
+
+def test_time_out_is_charged_to_the_stage_in_which_it_ran_out():
+    result = EpisodeRunner(beacons(limits={"max_time_s": 3.0})).run(0)
+    assert not result.success
+    assert result.failure_reason in FAILURE_REASONS
+    assert result.time_s == pytest.approx(3.0, abs=1.0 / 30.0)
+
+
+def test_darkness_ends_as_a_failed_search():
+    """With the lights as good as off there is nothing to find; nothing leaks the station's place to the pilot."""
+    cfg = beacons(attenuation_per_m=12.0, limits={"max_time_s": 30.0})
+    result = EpisodeRunner(cfg).run(0)
+    assert not result.success
+    assert result.failure_reason == "search"
+    assert result.entry_distance_m is None
+    assert result.distortion_rate is None
+
+
+def test_a_hard_contact_ends_as_collision():
+    cfg = beacons(limits={"collision_force_n": 1.0})
+    reasons = {EpisodeRunner(cfg).run(seed).failure_reason for seed in range(2)}
+    assert reasons <= {"collision", None}
+
+
+def test_diverging_state_ends_as_diverged():
+    runner = EpisodeRunner(beacons())
+    original = runner.world.step
+
+    def explode(values):
+        original(values)
+        if runner.world.truth.time_s > 1.0:
+            runner.world.simulator.data.qvel[0] = float("nan")
+
+    runner.world.step = explode
+    result = runner.run(0)
+    assert result.failure_reason == "diverged"
+    json.dumps(result.to_json(), allow_nan=False)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_every_level_loads_and_differs_from_the_default(level):
+    cfg = level_cfg(level)
+    assert isinstance(cfg, EpisodeCfg)
+    assert cfg != EpisodeCfg()
+
+
+def test_interrupt_leaves_a_readable_recording(tmp_path):
+    path = tmp_path / "run.rrd"
+    words = ["dock", "conical", "--fidelity", "beacons", "--attenuation", "12", "--record", str(path)]
+    process = subprocess.Popen([sys.executable, "-m", "auvdock.cli", *words], stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline and (not path.exists() or path.stat().st_size < 20_000):
+        time.sleep(0.1)
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    from auvdock.recording.viewer import check_recording
+
+    assert check_recording(path) > 0
