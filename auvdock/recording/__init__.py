@@ -1,1 +1,1 @@
-"""auvdock.recording."""
+"""Recordings of episodes for Rerun's viewer."""

@@ -1,0 +1,205 @@
+"""A batch of control periods turned into Rerun's columns: one call per entity instead of one per entity and period."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+
+from auvdock.core.arrays import Array, BoolArray, IntArray
+from auvdock.recording import paths
+from auvdock.recording.modes import ModeFollower
+from auvdock.recording.palette import CANDIDATE, IDENTIFIED, LOST, class_colours
+from auvdock.recording.pose_error import camera_in_station, pose_errors
+
+if TYPE_CHECKING:
+    from auvdock.core.contracts import Percept, PoseEstimate
+    from auvdock.episode.trace import EpisodeSetup, Tick
+
+__all__ = ["ColumnWriter", "Row"]
+
+_ARROW_M_PER_M_S = 4.0
+"""Length of the current's arrow: at 0.25 m/s it is a metre long."""
+_PIXEL_CORNER = 0.5
+"""Rerun's (0, 0) is the corner of the first pixel, this package's its centre."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One control period as it waits for its batch.
+
+    Attributes:
+        frame: number of the control period.
+        tick: the period, without its image.
+        jpeg: the encoded image, None if none is to be recorded.
+    """
+
+    frame: int
+    tick: Tick
+    jpeg: bytes | None
+
+
+class ColumnWriter:
+    """Writes batches of rows to a stream."""
+
+    def __init__(self, stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
+        """Begin an episode."""
+        self._stream = stream
+        self._setup = setup
+        self._modes = ModeFollower()
+        self._last_camera_world_m: Array | None = None
+
+    def write(self, rows: Sequence[Row]) -> None:
+        """Write rows (at least one) in their order."""
+        frames = np.array([row.frame for row in rows], dtype=np.int64)
+        times_s = np.array([row.tick.truth.time_s for row in rows])
+        T_world_body = np.array([row.tick.truth.T_world_body for row in rows])
+        batch = _Batch(self._stream, frames, times_s)
+        self._write_motion(batch, rows, T_world_body)
+        self._write_pose(batch, rows, T_world_body)
+        self._write_lights(batch, rows)
+        self._write_modes(batch, rows)
+        _write_images(batch, rows)
+
+    def _write_motion(self, batch: _Batch, rows: Sequence[Row], T_world_body: Array) -> None:
+        truths = [row.tick.truth for row in rows]
+        current = np.array([truth.current_world_m_s for truth in truths])
+        ground = np.linalg.norm([truth.nu_body[:3] for truth in truths], axis=1)
+        water = np.linalg.norm([truth.nu_relative_body[:3] for truth in truths], axis=1)
+        origin = T_world_body[:, :3, 3]
+        batch.send(paths.VEHICLE, rr.Transform3D.columns(translation=origin, mat3x3=T_world_body[:, :3, :3]))
+        batch.send(paths.CURRENT_ARROW, rr.Arrows3D.columns(vectors=_ARROW_M_PER_M_S * current, origins=origin))
+        batch.scalars(paths.CURRENT, current)
+        batch.scalars(paths.SPEED, np.column_stack([ground, water]))
+        batch.scalars(paths.RANGE, _ranges(rows))
+        batch.scalars(paths.CONTACT, np.array([truth.contact_force_n for truth in truths]))
+        batch.scalars(paths.COMMANDS, np.array([row.tick.command.values for row in rows]))
+
+    def _write_pose(self, batch: _Batch, rows: Sequence[Row], T_world_body: Array) -> None:
+        T_world_station = self._setup.T_world_station
+        T_station_camera = camera_in_station(T_world_station, T_world_body, self._setup.camera.T_body_camera)
+        self._write_path(batch, (T_world_station @ T_station_camera)[:, :3, 3])
+        percepts = [(index, row.tick.percept) for index, row in enumerate(rows) if row.tick.percept is not None]
+        if not percepts:
+            return
+        seen = np.array([index for index, _ in percepts])
+        poses = [_measured(percept) for _, percept in percepts]
+        has_pose = np.array([pose is not None for pose in poses])
+        measured = [pose for pose in poses if pose is not None]
+        estimated = np.array([pose.T_station_camera for pose in measured]).reshape(-1, 4, 4)
+        error_m, angle_rad = pose_errors(estimated, T_station_camera[seen[has_pose]])
+        frames = batch.select(seen)
+        # Frames without a measured pose get an empty row: the line breaks there instead of bridging the gap.
+        frames.scalars(paths.POSE_ERROR, error_m, has_pose)
+        frames.scalars(paths.POSE_ANGLE, np.degrees(angle_rad), has_pose)
+        frames.scalars(paths.REPROJECTION, np.array([pose.reprojection_error_px for pose in measured]), has_pose)
+        if measured:
+            positions = (T_world_station @ estimated)[:, :3, 3]
+            batch.select(seen[has_pose]).send(paths.ESTIMATES, rr.Points3D.columns(positions=positions))
+
+    def _write_path(self, batch: _Batch, camera_world_m: Array) -> None:
+        before = camera_world_m[0] if self._last_camera_world_m is None else self._last_camera_world_m
+        self._last_camera_world_m = camera_world_m[-1]
+        starts = np.vstack([before, camera_world_m[:-1]])
+        batch.send(
+            paths.PATH, rr.LineStrips3D.columns(strips=np.stack([starts, camera_world_m], axis=1).astype(np.float32))
+        )
+
+    def _write_lights(self, batch: _Batch, rows: Sequence[Row]) -> None:
+        seen = [(index, row.tick.percept) for index, row in enumerate(rows) if row.tick.percept is not None]
+        if not seen:
+            return
+        frames = batch.select(np.array([index for index, _ in seen]))
+        percepts = [percept for _, percept in seen]
+        _write_detections(frames, percepts)
+        _write_tracks(frames, percepts)
+        _write_bearings(frames, percepts)
+        counts = [(len(percept.detections), len(percept.tracks), percept.array_count) for percept in percepts]
+        frames.scalars(paths.LIGHT_COUNTS, np.array(counts, dtype=np.float64))
+
+    def _write_modes(self, batch: _Batch, rows: Sequence[Row]) -> None:
+        modes = [row.tick.command.mode for row in rows]
+        batch.scalars(paths.MODE_NUMBER, np.array([self._modes.number(mode) for mode in modes], dtype=np.float64))
+        ranges_m = _ranges(rows)
+        followed = (self._modes.follow(index, mode, float(ranges_m[index])) for index, mode in enumerate(modes))
+        changes = [change for change in followed if change is not None]
+        if changes:
+            at = batch.select(np.array([change.row for change in changes]))
+            at.send(paths.MODE_STATE, rr.StateChange.columns(state=[change.mode for change in changes]))
+            at.send(paths.MODE_LOG, rr.TextLog.columns(text=[change.text for change in changes]))
+
+
+class _Batch:
+    """A stream at the times of some rows."""
+
+    def __init__(self, stream: rr.RecordingStream, frames: IntArray, times_s: Array) -> None:
+        self._stream = stream
+        self._frames = frames
+        self._times_s = times_s
+        self._index = (rr.TimeColumn(paths.SIM_TIME, duration=times_s), rr.TimeColumn(paths.FRAME, sequence=frames))
+
+    def select(self, index: IntArray) -> _Batch:
+        """Only some rows."""
+        if len(index) == len(self._frames):
+            return self
+        return _Batch(self._stream, self._frames[index], self._times_s[index])
+
+    def send(self, path: str, columns: Iterable[rr.ComponentColumn]) -> None:
+        """One row of each column per time."""
+        self._stream.send_columns(path, self._index, columns, strict=True)
+
+    def scalars(self, path: str, values: Array, present: BoolArray | None = None) -> None:
+        """One or several series; `values` has a row for each time, or for each that is `present`."""
+        width = 1 if values.ndim == 1 else values.shape[1]
+        lengths = np.full(len(self._frames), width) if present is None else width * present.astype(np.int64)
+        self.send(path, rr.Scalars.columns(scalars=values.ravel()).partition(lengths))
+
+
+def _measured(percept: Percept) -> PoseEstimate | None:
+    pose = percept.pose
+    return pose if pose is not None and pose.measured else None
+
+
+def _ranges(rows: Sequence[Row]) -> Array:
+    """(n,) distance of the nose from the mouth's centre, m."""
+    return np.linalg.norm([row.tick.truth.nose_station_m for row in rows], axis=1)
+
+
+def _write_detections(frames: _Batch, percepts: Sequence[Percept]) -> None:
+    xyxy = np.concatenate([percept.detections.xyxy for percept in percepts]) + _PIXEL_CORNER
+    colours = class_colours(np.concatenate([percept.detections.class_id for percept in percepts]))
+    boxes = rr.Boxes2D.columns(
+        centers=(xyxy[:, :2] + xyxy[:, 2:]) / 2.0, half_sizes=(xyxy[:, 2:] - xyxy[:, :2]) / 2.0, colors=colours
+    )
+    frames.send(paths.DETECTIONS, boxes.partition([len(percept.detections) for percept in percepts]))
+
+
+def _write_tracks(frames: _Batch, percepts: Sequence[Percept]) -> None:
+    tracks = [track for percept in percepts for track in percept.tracks]
+    centres = np.array([track.centre_px for track in tracks]).reshape(-1, 2) + _PIXEL_CORNER
+    labels = [f"#{track.track_id}" if track.beacon_id is None else f"B{track.beacon_id}" for track in tracks]
+    colours = [LOST if track.missed else (CANDIDATE if track.beacon_id is None else IDENTIFIED) for track in tracks]
+    points = rr.Points2D.columns(positions=centres, labels=labels, colors=np.array(colours, dtype=np.uint32))
+    frames.send(paths.TRACKS, points.partition([len(percept.tracks) for percept in percepts]))
+
+
+def _write_bearings(frames: _Batch, percepts: Sequence[Percept]) -> None:
+    named = [
+        [(bearing, name) for bearing, name in ((percept.long_range, "far"), (percept.entrance, "entrance")) if bearing]
+        for percept in percepts
+    ]
+    flat = [pair for pairs in named for pair in pairs]
+    centres = np.array([bearing.centre_px for bearing, _ in flat]).reshape(-1, 2) + _PIXEL_CORNER
+    points = rr.Points2D.columns(positions=centres, labels=[name for _, name in flat])
+    frames.send(paths.BEARINGS, points.partition([len(pairs) for pairs in named]))
+
+
+def _write_images(batch: _Batch, rows: Sequence[Row]) -> None:
+    images = [(index, row.jpeg) for index, row in enumerate(rows) if row.jpeg is not None]
+    if images:
+        blobs = [np.frombuffer(jpeg, dtype=np.uint8) for _, jpeg in images]
+        columns = rr.EncodedImage.columns(blob=blobs, media_type=["image/jpeg"] * len(blobs))
+        batch.select(np.array([index for index, _ in images])).send(paths.IMAGE, columns)

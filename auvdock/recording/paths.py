@@ -1,0 +1,79 @@
+"""Names of the recording's entities and timelines, shared by what is logged and by the blueprint that shows it."""
+
+from __future__ import annotations
+
+__all__ = [
+    "APPLICATION_ID",
+    "BEAMS",
+    "BEARINGS",
+    "CAMERA",
+    "COMMANDS",
+    "CONTACT",
+    "CURRENT",
+    "CURRENT_ARROW",
+    "DETECTIONS",
+    "ESTIMATES",
+    "FRAME",
+    "FUNNEL",
+    "HULL",
+    "IMAGE",
+    "LIGHTS",
+    "LIGHT_COUNTS",
+    "MODE_LOG",
+    "MODE_NUMBER",
+    "MODE_STATE",
+    "PATH",
+    "POSE_ANGLE",
+    "POSE_ERROR",
+    "RANGE",
+    "REPROJECTION",
+    "SIM_TIME",
+    "SPEED",
+    "STATION",
+    "SUMMARY",
+    "TRACKS",
+    "TUBE",
+    "VEHICLE",
+    "WORLD",
+]
+
+APPLICATION_ID = "auvdock"
+
+SIM_TIME = "sim_time"
+"""Timeline: simulated seconds since the episode began."""
+FRAME = "frame"
+"""Timeline: number of the control period, from 0."""
+
+WORLD = "/world"
+STATION = "/world/station"
+FUNNEL = "/world/station/funnel"
+TUBE = "/world/station/tube"
+LIGHTS = "/world/station/lights"
+BEAMS = "/world/station/beams"
+VEHICLE = "/world/vehicle"
+HULL = "/world/vehicle/hull"
+CAMERA = "/world/vehicle/camera"
+IMAGE = "/world/vehicle/camera/image"
+DETECTIONS = "/world/vehicle/camera/detections"
+TRACKS = "/world/vehicle/camera/tracks"
+BEARINGS = "/world/vehicle/camera/bearings"
+PATH = "/world/camera_path"
+"""True path of the camera, comparable with `ESTIMATES`."""
+ESTIMATES = "/world/camera_estimates"
+"""Camera positions from measured poses."""
+CURRENT_ARROW = "/world/current"
+
+POSE_ERROR = "/plots/pose_error_m"
+POSE_ANGLE = "/plots/pose_angle_deg"
+REPROJECTION = "/plots/reprojection_px"
+RANGE = "/plots/range_m"
+SPEED = "/plots/speed_m_s"
+LIGHT_COUNTS = "/plots/lights"
+COMMANDS = "/plots/commands"
+CURRENT = "/plots/current_m_s"
+CONTACT = "/plots/contact_n"
+
+MODE_NUMBER = "/mode/number"
+MODE_STATE = "/mode/state"
+MODE_LOG = "/mode/log"
+SUMMARY = "/summary"
