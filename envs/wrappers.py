@@ -1,0 +1,99 @@
+"""Action wrappers: command a body wrench or set-points instead of single actuators.
+
+| Wrapper | Action (all in [-1, 1]) | Meaning at ±1 |
+|---|---|---|
+| `BodyWrenchAction` | surge X, sway Y, heave Z, pitch M, yaw N | the most that the thrusters give on that axis alone |
+| `SetPointAction` | surge, sway, heave, heading change | 1 m/s, 0.3 m/s, 0.3 m/s, 0.5 rad |
+
+Both use only the vehicle's own sensors.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from auvdock.controllers.allocation import ThrustAllocator
+from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotSetpoint
+from auvdock.core.arrays import Array
+from auvdock.core.vehicle import VehicleCfg
+from auvdock.envs.docking import DockingEnv
+
+__all__ = ["BodyWrenchAction", "SetPointAction"]
+
+_AXES = (0, 1, 2, 4, 5)
+"""Surge, sway, heave, pitch, yaw; no actuator acts in roll."""
+
+
+def _docking(env: gymnasium.Env[Any, Any]) -> DockingEnv:
+    inner = env.unwrapped
+    if not isinstance(inner, DockingEnv):
+        raise TypeError(f"{type(inner).__name__} is no docking environment")
+    return inner
+
+
+def _reach(vehicle: VehicleCfg) -> Array:
+    """(6,) greatest wrench of the thrusters on each axis by itself, N and N m."""
+    thrusters = [actuator.kind == "thruster" for actuator in vehicle.actuators]
+    return np.abs(vehicle.thruster_wrenches_body[:, thrusters]).sum(axis=1)
+
+
+class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
+    """Actions are body wrenches τ = (X, Y, Z, M, N) in shares of the thrusters' reach; see the module's table.
+
+    Positive is ahead, to port, up, nose down and to port (body axes x forward, y port, z up).
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        """Wrap a docking environment."""
+        super().__init__(env)
+        vehicle = _docking(env).world.simulator.vehicle
+        self._allocator = ThrustAllocator(vehicle)
+        self._reach = _reach(vehicle)
+        self.action_space = spaces.Box(-1.0, 1.0, (len(_AXES),), np.float32)
+
+    def action(self, action: Any) -> Any:  # noqa: ANN401
+        """Actuator commands for a wrench."""
+        wrench = np.zeros(6)
+        wrench[list(_AXES)] = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        surge_m_s = float(_docking(self.env).proprioception.velocity_water_m_s[0])
+        return self._allocator.allocate(wrench * self._reach, surge_m_s).astype(np.float32)
+
+
+class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any]):
+    """Actions are set-points of the vehicle's autopilot, level and over ground; see the module's table.
+
+    The heading set-point is the heading now plus the action's change.
+    """
+
+    SCALE = np.array([1.0, 0.3, 0.3, 0.5])
+    """m/s ahead, m/s to port, m/s up, rad to port."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any], cfg: AutopilotCfg | None = None) -> None:
+        """Wrap a docking environment."""
+        super().__init__(env)
+        inner = _docking(env)
+        vehicle = inner.world.simulator.vehicle
+        self._autopilot = Autopilot(vehicle, cfg or AutopilotCfg(), 1.0 / inner.cfg.control_hz)
+        self._allocator = ThrustAllocator(vehicle)
+        self._state = self._autopilot.initial_state()
+        self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Reset the environment and the autopilot."""
+        self._state = self._autopilot.initial_state()
+        return super().reset(seed=seed, options=options)
+
+    def action(self, action: Any) -> Any:  # noqa: ANN401
+        """Actuator commands for set-points."""
+        own = _docking(self.env).proprioception
+        share = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0) * self.SCALE
+        surge, sway, heave, turn = (float(part) for part in share)
+        setpoint = AutopilotSetpoint(surge, sway, heave, 0.0, float(own.euler_zyx_rad[2]) + turn)
+        wrench, self._state = self._autopilot.step(self._state, setpoint, own)
+        values, achieved = self._allocator.solve(wrench, float(own.velocity_water_m_s[0]))
+        self._state = self._autopilot.settle(self._state, wrench, achieved)
+        return values.astype(np.float32)
