@@ -1,0 +1,52 @@
+"""What every association of lights with beacons has in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from auvdock.core.arrays import Array
+from auvdock.core.contracts import Detections, PoseEstimate
+from auvdock.perception.pnp import PnpSolution
+from auvdock.perception.tracker import LightTracker
+
+__all__ = ["Associated", "Association", "pose_estimate"]
+
+
+@dataclass(frozen=True, eq=False)
+class Associated:
+    """Outcome of one frame.
+
+    Attributes:
+        pose: the pose, None while there is none.
+        array_count: beacons identified among this frame's detections.
+        solution: the solution behind a pose, None for a held one.
+    """
+
+    pose: PoseEstimate | None = None
+    array_count: int = 0
+    solution: PnpSolution | None = None
+
+
+class Association(Protocol):
+    """Names the beacons among the lights and solves the pose."""
+
+    def reset(self) -> None:
+        """Forget everything."""
+        ...
+
+    def update(self, tracks: LightTracker, detections: Detections, rotation_prior: Array) -> Associated:
+        """Process one frame; writes `tracks.beacon_id`."""
+        ...
+
+
+def pose_estimate(solution: PnpSolution, beacon_ids: tuple[int, ...], error_px: float, measured: bool) -> PoseEstimate:
+    """The contract's form of a solution."""
+    return PoseEstimate(
+        T_station_camera=solution.T_station_camera(),
+        covariance=solution.covariance(),
+        beacon_ids=beacon_ids,
+        solver=solution.solver,
+        reprojection_error_px=error_px,
+        measured=measured,
+    )

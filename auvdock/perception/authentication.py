@@ -1,0 +1,176 @@
+"""Which light is which beacon: paper A's algorithm 1, made to stand spurious lights and missing beacons.
+
+Steps of the paper: (1) keep tracks seen often and surely enough within a window, surest first; (2) keep those whose
+point-symmetric partner about the array's centre is there; (3) order by angle and hand out B0, B1, ... Step 2 of the
+paper takes the centroid of *all* candidates as the centre, which two spurious lights, or the far lamp above the ring,
+displace by more than its tolerance. Here every pair of candidates proposes itself as an opposite pair: its direction
+gives its two identities (step 3: the vehicle knows how it is rolled), and with the vehicle's attitude its two images
+fix where the array's centre and all other beacons must be. The proposal that finds most beacons there, and finds
+them nearest, wins; the pose solver has the last word.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.errors import ConfigError
+
+__all__ = ["AuthenticationCfg", "Authenticator", "symmetric_pairs"]
+
+
+@dataclass(frozen=True)
+class AuthenticationCfg:
+    """When a light is believed to be a beacon."""
+
+    min_occurrences: int = 3
+    """Detections within the tracker's window (algorithm 1, line 6)."""
+    min_confidence: float = 0.2
+    """Mean score of those detections (algorithm 1, line 6)."""
+    min_beacons: int = 4
+    """Beacons that a proposal must find."""
+    max_candidates: int = 12
+    """Only the surest candidates are tried."""
+    max_angle_deg: float = 25.0
+    """Greatest difference in direction between a pair in the image and the opposite pair it claims to be. The ring of
+    six repeats every 60°, so 30° is the limit of what can be told apart."""
+    tolerance: float = 0.2
+    """Greatest distance between a candidate and where a beacon must be, over the array's radius in the image."""
+    tolerance_px: float = 1.5
+    """Added to it for noise."""
+    proposals: int = 3
+    """Best proposals handed to the pose solver."""
+
+    def __post_init__(self) -> None:
+        """Refuse thresholds without meaning."""
+        if self.min_beacons < 4:
+            raise ConfigError("authentication.min_beacons", self.min_beacons, "4 or more, PnP needs 4")
+        if not 0.0 < self.max_angle_deg <= 90.0:
+            raise ConfigError("authentication.max_angle_deg", self.max_angle_deg, "an angle above 0 and up to 90")
+        if not 0.0 <= self.min_confidence <= 1.0:
+            raise ConfigError("authentication.min_confidence", self.min_confidence, "a fraction of 0 to 1")
+        for name in ("min_occurrences", "proposals", "max_candidates"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"authentication.{name}", getattr(self, name), "1 or more")
+        for name in ("tolerance", "tolerance_px"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"authentication.{name}", getattr(self, name), "a value above 0")
+
+
+class Authenticator:
+    """Proposes identities for the candidates of one frame."""
+
+    def __init__(self, cfg: AuthenticationCfg, points_m: Array, focal_px: float) -> None:
+        """Find the array's opposite pairs.
+
+        Args:
+            cfg: thresholds.
+            points_m: (k, 3) array beacons in the station frame.
+            focal_px: focal length, to turn pixels into angles.
+        """
+        self._cfg = cfg
+        self._points = points_m
+        self._pairs = symmetric_pairs(points_m)
+        self._radius_m = float(np.linalg.norm(points_m - points_m.mean(axis=0), axis=1).mean())
+        self._tolerance = cfg.tolerance_px / focal_px
+        self._min_cosine = math.cos(math.radians(cfg.max_angle_deg))
+
+    def candidates(self, occurrences: IntArray, confidence: Array) -> IntArray:
+        """Indices of the tracks that are seen often and surely enough, surest first (algorithm 1, lines 1 to 7)."""
+        good = np.flatnonzero((occurrences >= self._cfg.min_occurrences) & (confidence >= self._cfg.min_confidence))
+        return good[np.argsort(-confidence[good], kind="stable")][: self._cfg.max_candidates]
+
+    def propose(self, xy: Array, rotation: Array) -> list[IntArray]:
+        """Possible identities, best first.
+
+        Args:
+            xy: (n, 2) undistorted normalised image coordinates of the candidates.
+            rotation: (3, 3) R_camera_station of the vehicle's own attitude.
+
+        Returns:
+            Arrays (k,): for each array beacon the index of its candidate, -1 where it is not seen.
+        """
+        if len(xy) < self._cfg.min_beacons:
+            return []
+        q = self._points @ rotation.T
+        first, second, low, high = self._pair_up(xy, q)
+        if len(first) == 0:
+            return []
+        translation, valid = _translations(xy, q, first, second, low, high)
+        predicted = q[None] + translation[:, None]
+        valid &= predicted[:, :, 2].min(axis=1) > 0.1
+        predicted, depth = predicted[valid], translation[valid, 2]
+        if len(predicted) == 0:
+            return []
+        image = predicted[:, :, :2] / predicted[:, :, 2:]
+        gap = np.linalg.norm(image[:, :, None] - xy[None, None], axis=3)
+        nearest = gap.argmin(axis=2)
+        distance = np.take_along_axis(gap, nearest[:, :, None], axis=2)[:, :, 0]
+        tolerance = self._cfg.tolerance * self._radius_m / depth + self._tolerance
+        found = distance <= tolerance[:, None]
+        badness = np.where(found, distance / tolerance[:, None], 1.0).sum(axis=1)
+        identities: list[IntArray] = []
+        for index in np.argsort(badness, kind="stable"):
+            if np.count_nonzero(found[index]) < self._cfg.min_beacons:
+                continue
+            identity = _unique(np.where(found[index], nearest[index], -1), distance[index])
+            if np.count_nonzero(identity >= 0) < self._cfg.min_beacons:
+                continue
+            if not any(np.array_equal(identity, other) for other in identities):
+                identities.append(identity)
+                if len(identities) == self._cfg.proposals:
+                    break
+        return identities
+
+    def _pair_up(self, xy: Array, q: Array) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+        """Every ordered pair of candidates and every pair of beacons whose directions agree."""
+        n = len(xy)
+        a, b = np.divmod(np.arange(n * n), n)
+        a, b = a[a != b], b[a != b]
+        low, high = self._pairs[:, 0], self._pairs[:, 1]
+        seen = xy[b] - xy[a]
+        expected = q[high, :2] - q[low, :2]
+        cosine = (seen @ expected.T) / (
+            np.linalg.norm(seen, axis=1)[:, None] * np.linalg.norm(expected, axis=1)[None] + 1e-12
+        )
+        row, column = np.nonzero(cosine >= self._min_cosine)
+        return a[row], b[row], low[column], high[column]
+
+
+def symmetric_pairs(points_m: Array) -> IntArray:
+    """(p, 2) index pairs of beacons that lie opposite each other about the centroid; all pairs if fewer than two do."""
+    centre = points_m.mean(axis=0)
+    radius = float(np.linalg.norm(points_m - centre, axis=1).max())
+    every = np.array([(i, j) for i in range(len(points_m)) for j in range(i + 1, len(points_m))], dtype=np.int64)
+    gap = np.linalg.norm(points_m[every[:, 0]] + points_m[every[:, 1]] - 2.0 * centre, axis=1)
+    opposite = every[gap < 0.05 * radius]
+    return opposite if len(opposite) >= 2 else every
+
+
+def _translations(
+    xy: Array, q: Array, first: IntArray, second: IntArray, low: IntArray, high: IntArray
+) -> tuple[Array, Array]:
+    """Least-squares translation (h, 3) from two images each, rotation known, and whether it lies in front."""
+    image = np.stack([xy[first], xy[second]], axis=1)
+    point = np.stack([q[low], q[high]], axis=1)
+    e = image * point[:, :, 2:] - point[:, :, :2]
+    mean_image, mean_e = image.mean(axis=1), e.mean(axis=1)
+    centred = image - mean_image[:, None]
+    spread = np.einsum("hij,hij->h", centred, centred)
+    depth = -np.einsum("hij,hij->h", centred, e) / np.maximum(spread, 1e-12)
+    return np.column_stack([mean_e + mean_image * depth[:, None], depth]), (depth > 0.1) & (spread > 1e-12)
+
+
+def _unique(identity: IntArray, distance: Array) -> IntArray:
+    """Leave each candidate to the nearest beacon that claims it."""
+    taken: set[int] = set()
+    result = np.full(len(identity), -1, dtype=np.int64)
+    for beacon in np.argsort(distance, kind="stable"):
+        candidate = int(identity[beacon])
+        if candidate >= 0 and candidate not in taken:
+            taken.add(candidate)
+            result[beacon] = candidate
+    return result

@@ -1,0 +1,66 @@
+"""Detectors by name: the package's own and a user's."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+from auvdock.core.contracts import Detector
+from auvdock.core.errors import ConfigError
+from auvdock.perception.blob import BlobCfg, BlobDetector
+from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
+
+__all__ = ["DETECTORS", "make_detector"]
+
+DETECTORS = ("threshold", "blob")
+"""Names of the package's own detectors; anything with a colon is looked up as "package.module:Name"."""
+
+
+def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
+    """A detector by name.
+
+    Args:
+        name: "threshold", "blob", or "package.module:Name" for a class or factory of your own.
+        settings: fields of the detector's configuration; keyword arguments of your own class.
+
+    Raises:
+        ConfigError: unknown name or setting, or an object that is no detector.
+    """
+    if name == "threshold":
+        return ThresholdDetector(_configure(ThresholdCfg, settings))
+    if name == "blob":
+        return BlobDetector(_configure(BlobCfg, settings))
+    if ":" not in name:
+        raise ConfigError("detector", name, f"one of {', '.join(DETECTORS)}, or your own as package.module:Name")
+    return _foreign(name, settings)
+
+
+_T = TypeVar("_T")
+
+
+def _configure(cls: type[_T], settings: dict[str, Any]) -> _T:
+    known = [field.name for field in dataclasses.fields(cast(Any, cls))]
+    for key in settings:
+        if key not in known:
+            raise ConfigError(f"detector.{key}", settings[key], f"one of {', '.join(known)} (this key is unknown)")
+    return cls(**settings)
+
+
+def _foreign(name: str, settings: dict[str, Any]) -> Detector:
+    module_name, _, attribute = name.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except (ImportError, ValueError) as error:
+        raise ConfigError("detector", name, f"a module that can be imported ({error})") from error
+    factory: Callable[..., Any] | None = getattr(module, attribute, None)
+    if not callable(factory):
+        raise ConfigError("detector", name, f"a class or function that {module_name} has")
+    try:
+        detector = factory(**settings)
+    except TypeError as error:
+        raise ConfigError("detector", name, f"settings that {attribute} takes ({error})") from error
+    if not callable(getattr(detector, "detect", None)):
+        raise ConfigError("detector", name, "a class with a method detect(frame, regions) -> Detections")
+    return cast(Detector, detector)

@@ -1,0 +1,101 @@
+"""What the classical detectors share: background, noise, and the colour of a light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from auvdock.core.arrays import Array, Image, IntArray
+from auvdock.core.contracts import BLUE, RED, Detections, RegionOfInterest
+
+__all__ = ["CELL_PX", "background", "brightest_channel", "crop_of", "inside", "light_class", "noise_sigma"]
+
+CELL_PX = 8
+"""Side of a cell of the low-resolution background."""
+_MARGIN_PX = 64
+_SATURATED = 250
+
+
+def brightest_channel(image: Image) -> Image:
+    """(H, W) maximum over the channels, lightly smoothed against pixel noise."""
+    red, green, blue = cv2.split(image)
+    return np.asarray(cv2.GaussianBlur(cv2.max(cv2.max(red, green), blue), (3, 3), 0.8), dtype=np.uint8)
+
+
+def background(level: Image, size_px: int) -> Image:
+    """(H, W) what is broader than `size_px`: grey opening of the image at an eighth of its resolution.
+
+    Haze, daylight and the wide halos of turbid water stay in it; cores and the peaks of halos do not.
+    """
+    height, width = level.shape
+    small = cv2.resize(level, (-(-width // CELL_PX), -(-height // CELL_PX)), interpolation=cv2.INTER_AREA)
+    side = max(3, 2 * round(size_px / CELL_PX / 2) + 1)
+    kernel = np.ones((side, side), dtype=np.uint8)
+    opened = cv2.blur(cv2.morphologyEx(small, cv2.MORPH_OPEN, kernel, borderType=cv2.BORDER_REPLICATE), (3, 3))
+    return np.asarray(cv2.resize(opened, (width, height), interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
+
+
+def noise_sigma(level: Image) -> float:
+    """Robust σ of the pixel noise in grey levels: the median of |difference of pixels four apart| over 0.6745 √2.
+
+    At least 0.5, the rounding of eight bits included.
+    """
+    sample = level[::4, ::4]
+    difference = cv2.absdiff(sample[:, 1:], sample[:, :-1])
+    counts = np.bincount(difference.ravel(), minlength=2)
+    # A histogram of integers: the median is interpolated within its bin.
+    total = np.cumsum(counts)
+    half = 0.5 * total[-1]
+    index = int(np.searchsorted(total, half))
+    before = total[index - 1] if index else 0
+    median = index - 0.5 + (half - before) / max(counts[index], 1)
+    return max(0.5, max(median, 0.0) / (0.6745 * np.sqrt(2.0)))
+
+
+def light_class(image: Image, left: int, top: int, right: int, bottom: int) -> int:
+    """`RED` or `BLUE` of the light in a box (upper bounds excluded).
+
+    A light's core saturates in all channels to white: the colour is read from the unsaturated pixels of the box and its
+    neighbourhood, against the colour of the neighbourhood's rim.
+    """
+    height, width = image.shape[:2]
+    pad = 3
+    patch = image[max(top - pad, 0) : min(bottom + pad, height), max(left - pad, 0) : min(right + pad, width)]
+    flat = patch.reshape(-1, 3)
+    rim = np.concatenate([patch[0], patch[-1], patch[:, 0], patch[:, -1]])
+    usable = flat[flat.max(axis=1) < _SATURATED]
+    excess = (usable if len(usable) else flat).mean(axis=0) - np.percentile(rim, 20, axis=0)
+    return RED if excess[0] > excess[2] else BLUE
+
+
+def crop_of(region: RegionOfInterest, height: int, width: int) -> tuple[int, int, int, int]:
+    """(left, top, right, bottom) of the part of the image that decides about a region.
+
+    A margin as wide as the background's window is added and the grid of the background is kept, so that a light is found
+    at the same place with and without regions.
+    """
+    left = max((region.x0 - _MARGIN_PX) // CELL_PX * CELL_PX, 0)
+    top = max((region.y0 - _MARGIN_PX) // CELL_PX * CELL_PX, 0)
+    right = min(-(-(region.x1 + _MARGIN_PX) // CELL_PX) * CELL_PX, width)
+    bottom = min(-(-(region.y1 + _MARGIN_PX) // CELL_PX) * CELL_PX, height)
+    return left, top, max(right, left), max(bottom, top)
+
+
+def inside(detections: Detections, regions: Sequence[RegionOfInterest]) -> Detections:
+    """Detections whose centre lies in a region, each once."""
+    if len(detections) == 0:
+        return detections
+    u, v = detections.centre_px[:, 0], detections.centre_px[:, 1]
+    keep = np.zeros(len(detections), dtype=np.bool_)
+    for region in regions:
+        keep |= (u >= region.x0) & (u < region.x1) & (v >= region.y0) & (v < region.y1)
+    kept = detections.select(keep)
+    if len(kept) == 0:
+        return kept
+    # Overlapping regions see a light twice, at the same centre up to rounding.
+    keys: Array = np.round(kept.centre_px)
+    _, first = np.unique(keys, axis=0, return_index=True)
+    order: IntArray = np.sort(first)
+    return kept.select(order)

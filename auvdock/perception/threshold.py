@@ -1,0 +1,168 @@
+"""The threshold detector: brightness above background, connected components, centroids (paper A's baseline a).
+
+The published baseline binarises globally. Haze and halo make that useless in turbid water, so the threshold here stands
+on an estimate of background and noise; and since neighbouring lights grow together at a low level, each component is cut
+again at higher levels until it stops falling apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from auvdock.core.arrays import Image
+from auvdock.core.contracts import Detections, Frame, RegionOfInterest
+from auvdock.core.errors import ConfigError
+from auvdock.perception.spots import background, brightest_channel, crop_of, inside, light_class, noise_sigma
+
+__all__ = ["ThresholdCfg", "ThresholdDetector"]
+
+_MAX_DEPTH = 6
+_SCORE_HALF_SNR = 10.0
+
+
+@dataclass(frozen=True)
+class ThresholdCfg:
+    """Settings of the threshold detector."""
+
+    noise_factor: float = 6.0
+    """Threshold above the background in σ of the noise."""
+    min_contrast: float = 8.0
+    """Threshold above the background in grey levels, at least."""
+    min_area_px: int = 3
+    """Smaller components are noise."""
+    background_px: int = 40
+    """What is broader than this is background; more than the largest core, less than the spacing of the lights matters
+    little."""
+    max_lights: int = 32
+    """Only the components of greatest contrast are kept."""
+
+    def __post_init__(self) -> None:
+        """Refuse thresholds without meaning."""
+        for name in ("noise_factor", "min_contrast"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"detector.{name}", getattr(self, name), "a value above 0")
+        for name in ("min_area_px", "background_px", "max_lights"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"detector.{name}", getattr(self, name), "1 or more")
+
+
+@dataclass(frozen=True)
+class _Spot:
+    left: int
+    top: int
+    right: int
+    bottom: int
+    u: float
+    v: float
+    peak: float
+
+
+class ThresholdDetector:
+    """Finds bright spots."""
+
+    def __init__(self, cfg: ThresholdCfg | None = None) -> None:
+        """Keep the settings."""
+        self._cfg = cfg or ThresholdCfg()
+
+    def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> Detections:
+        """Detect in the whole frame, or only in the given regions when there are any.
+
+        A light's centre is the centroid, weighted by brightness above the level at which it was cut out, of the part
+        brighter than half of its peak. Score = s / (s + 10) with s the peak above background over the noise.
+        """
+        if not regions:
+            return self._detect(frame.image, 0, 0)
+        height, width = frame.image.shape[:2]
+        parts: list[Detections] = []
+        for region in regions:
+            left, top, right, bottom = crop_of(region, height, width)
+            if right - left >= 16 and bottom - top >= 16:
+                found = self._detect(np.ascontiguousarray(frame.image[top:bottom, left:right]), left, top)
+                parts.append(inside(found, (region,)))
+        parts = [part for part in parts if len(part)]
+        if not parts:
+            return Detections.empty()
+        return inside(
+            Detections(
+                np.vstack([part.xyxy for part in parts]),
+                np.vstack([part.centre_px for part in parts]),
+                np.concatenate([part.score for part in parts]),
+                np.concatenate([part.class_id for part in parts]),
+            ),
+            regions,
+        )
+
+    def _detect(self, image: Image, left: int, top: int) -> Detections:
+        cfg = self._cfg
+        level = brightest_channel(image)
+        sigma = noise_sigma(level)
+        contrast = np.asarray(cv2.subtract(level, background(level, cfg.background_px)), dtype=np.uint8)
+        threshold = max(cfg.min_contrast, cfg.noise_factor * sigma)
+        spots: list[_Spot] = []
+        for x, y, w, h, _ in self._components(contrast, threshold):
+            self._split(contrast[y : y + h, x : x + w], threshold, x, y, 3.0 * sigma, spots)
+        if not spots:
+            return Detections.empty()
+        spots.sort(key=lambda spot: (-spot.peak, spot.v, spot.u))
+        spots = spots[: cfg.max_lights]
+        boxes = np.array([[s.left, s.top, s.right, s.bottom] for s in spots], dtype=np.float64)
+        centres = np.array([[s.u, s.v] for s in spots])
+        snr = np.array([s.peak for s in spots]) / sigma
+        classes = np.array([light_class(image, s.left, s.top, s.right, s.bottom) for s in spots], dtype=np.int64)
+        offset = np.array([left, top], dtype=np.float64)
+        return Detections(boxes + np.tile(offset, 2) - 0.5, centres + offset, snr / (snr + _SCORE_HALF_SNR), classes)
+
+    def _components(self, contrast: Image, threshold: float) -> list[tuple[int, int, int, int, int]]:
+        """(x, y, width, height, area) of the components above a threshold."""
+        _, mask = cv2.threshold(contrast, threshold, 255, cv2.THRESH_BINARY)
+        count, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_16U)
+        if count > 2000:
+            # A threshold drowned in noise: keep the largest, the rest is no light.
+            stats = stats[np.argsort(-stats[:, cv2.CC_STAT_AREA], kind="stable")[:2000]]
+            return [tuple(row) for row in stats.tolist() if row[4] >= self._cfg.min_area_px and row[4] < mask.size / 2]
+        return [tuple(row) for row in stats[1:].tolist() if row[4] >= self._cfg.min_area_px]
+
+    def _split(
+        self, patch: Image, floor: float, x: int, y: int, prominence: float, spots: list[_Spot], depth: int = 0
+    ) -> None:
+        """Cut a component at higher levels; where it falls apart go on with its parts, else take it as one light."""
+        peak = float(patch.max())
+        if depth < _MAX_DEPTH and patch.size >= 36:
+            for fraction in (0.5, 0.75, 0.9):
+                level = floor + fraction * (peak - floor)
+                if peak - level <= prominence:
+                    break
+                parts = [
+                    part
+                    for part in self._components(patch, level)
+                    if float(patch[part[1] : part[1] + part[3], part[0] : part[0] + part[2]].max()) > level + prominence
+                ]
+                if len(parts) > 1:
+                    for px, py, w, h, _ in parts:
+                        self._split(
+                            patch[py : py + h, px : px + w], level, x + px, y + py, prominence, spots, depth + 1
+                        )
+                    return
+        spots.append(_measure(patch, floor, peak, x, y))
+
+
+def _measure(patch: Image, floor: float, peak: float, x: int, y: int) -> _Spot:
+    """Centroid of the part brighter than half-way from the floor to the peak."""
+    level = floor + 0.5 * (peak - floor)
+    weight = np.maximum(patch.astype(np.float64) - level, 0.0)
+    columns, rows = weight.sum(axis=0), weight.sum(axis=1)
+    total = float(columns.sum())
+    lit_columns, lit_rows = np.flatnonzero(columns), np.flatnonzero(rows)
+    return _Spot(
+        left=x + int(lit_columns[0]),
+        top=y + int(lit_rows[0]),
+        right=x + int(lit_columns[-1]) + 1,
+        bottom=y + int(lit_rows[-1]) + 1,
+        u=x + float(columns @ np.arange(len(columns))) / total,
+        v=y + float(rows @ np.arange(len(rows))) / total,
+        peak=peak,
+    )

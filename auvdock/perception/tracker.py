@@ -1,0 +1,210 @@
+"""Kalman tracks of lights in the image: constant velocity, confidence-weighted noise, at most ten predicted frames.
+
+Paper A, section 4.1. All tracks are filtered at once: the axes of one light share their covariance, so a track's 4 × 4
+covariance is three numbers and the whole filter a few array operations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from filterpy.common import Q_discrete_white_noise
+from scipy.optimize import linear_sum_assignment
+
+from auvdock.core.arrays import Array, BoolArray, IntArray
+from auvdock.core.contracts import Detections
+from auvdock.core.errors import ConfigError
+
+__all__ = ["LightTracker", "TrackerCfg"]
+
+_UNMATCHED_COST = 40.0
+
+
+@dataclass(frozen=True)
+class TrackerCfg:
+    """How lights are tracked."""
+
+    pixel_sigma_px: float = 0.5
+    """σ of a detection's centre at full confidence; R = σ² / (score + 0.1)."""
+    acceleration_px_s2: float = 200.0
+    """σ_a, standard deviation of a light's acceleration in the image."""
+    initial_speed_px_s: float = 120.0
+    """Standard deviation of a new track's unknown velocity."""
+    gate_sigmas: float = 4.0
+    """A detection farther than this from the prediction is another light."""
+    max_predicted_frames: int = 10
+    """A confirmed track outlives this many frames without a detection and dies at the next (paper A: 10)."""
+    confirm_hits: int = 3
+    """Detections after which a track is confirmed."""
+    max_tentative_frames: int = 2
+    """An unconfirmed track outlives this many frames without a detection."""
+    window_frames: int = 6
+    """Length of the history that authentication looks back on."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no filter can use."""
+        for name in ("pixel_sigma_px", "acceleration_px_s2", "initial_speed_px_s", "gate_sigmas"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"tracker.{name}", getattr(self, name), "a value above 0")
+        for name in ("confirm_hits", "window_frames"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"tracker.{name}", getattr(self, name), "1 or more")
+        for name in ("max_predicted_frames", "max_tentative_frames"):
+            if getattr(self, name) < 0:
+                raise ConfigError(f"tracker.{name}", getattr(self, name), "0 or more")
+
+
+class LightTracker:
+    """Tracks of all lights, one row each.
+
+    State per track x = [u, v, u̇, v̇]; per axis F = [[1, dt], [0, 1]], Q = σ_a² [[dt⁴/4, dt³/2], [dt³/2, dt²]],
+    H = [1, 0], R = σ² / (score + 0.1). Detections are assigned to predictions of their own class by the Hungarian
+    method at cost d²/S + 2 ln(S/R), gated at d² / S ≤ gate².
+
+    Attributes:
+        state: (n, 4) u, v in px and u̇, v̇ in px/s.
+        covariance: (n, 3) per-axis P₀₀ in px², P₀₁ in px²/s, P₁₁ in px²/s².
+        track_id: (n,) unique since the last reset.
+        class_id: (n,) class of the light.
+        missed: (n,) consecutive frames without a detection.
+        hits: (n,) detections so far.
+        beacon_id: (n,) authenticated beacon, -1 for none; the association writes it.
+        detection: (n,) index of this frame's detection, -1 for none.
+        history: (n, window) scores in the last frames in no particular order, 0 where there was no detection.
+    """
+
+    def __init__(self, cfg: TrackerCfg, rate_hz: float, width_px: int, height_px: int) -> None:
+        """Precompute the filter's constants for a camera's rate and size."""
+        self._cfg = cfg
+        self._dt = 1.0 / rate_hz
+        noise = np.asarray(Q_discrete_white_noise(2, self._dt, cfg.acceleration_px_s2**2), dtype=np.float64)
+        self._q = (float(noise[0, 0]), float(noise[0, 1]), float(noise[1, 1]))
+        self._gate = cfg.gate_sigmas**2
+        self._variance = cfg.pixel_sigma_px**2
+        margin = 0.1
+        self._low = np.array([-margin * width_px, -margin * height_px])
+        self._high = np.array([(1.0 + margin) * width_px, (1.0 + margin) * height_px])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all tracks."""
+        self.state: Array = np.zeros((0, 4))
+        self.covariance: Array = np.zeros((0, 3))
+        self.history: Array = np.zeros((0, self._cfg.window_frames))
+        self._labels: IntArray = np.zeros((0, 6), dtype=np.int64)
+        self._bind()
+        self._next_id = 0
+        self._slot = 0
+
+    def __len__(self) -> int:
+        """Number of tracks alive."""
+        return len(self.state)
+
+    def update(self, detections: Detections) -> None:
+        """Advance one frame: predict, assign, correct, start new tracks, end old ones."""
+        cfg = self._cfg
+        self._slot = (self._slot + 1) % cfg.window_frames
+        n, m = len(self.state), len(detections)
+        variance = self._variance / (detections.score + 0.1)
+        free = np.ones(m, dtype=np.bool_)
+        if n:
+            self._predict()
+            matched = np.full(n, -1, dtype=np.int64)
+            if m:
+                rows, columns = self._assign(detections, variance)
+                matched[rows] = columns
+                free[columns] = False
+                self._correct(matched, detections, variance)
+            hit = matched >= 0
+            self.detection[:] = matched
+            self.missed += 1
+            self.missed[hit] = 0
+            self.hits += hit
+            self.history[:, self._slot] = np.where(hit, detections.score[matched], 0.0) if m else 0.0
+            if not hit.all():
+                self._bury()
+        if free.any():
+            self._start(free, detections, variance)
+
+    def position_sigma_px(self) -> Array:
+        """(n,) standard deviation of each track's position, per axis."""
+        return np.sqrt(self.covariance[:, 0])
+
+    def occurrences(self) -> IntArray:
+        """(n,) detections within the window."""
+        return np.count_nonzero(self.history, axis=1)
+
+    def mean_confidence(self) -> Array:
+        """(n,) mean score of the detections within the window, 0 where there is none."""
+        return self.history.sum(axis=1) / np.maximum(self.occurrences(), 1)
+
+    def _bind(self) -> None:
+        self.track_id, self.class_id, self.missed, self.hits, self.beacon_id, self.detection = self._labels.T
+
+    def _predict(self) -> None:
+        dt, (q00, q01, q11) = self._dt, self._q
+        p00, p01, p11 = self.covariance.T
+        self.state[:, :2] += dt * self.state[:, 2:]
+        p00 += dt * (2.0 * p01 + dt * p11) + q00
+        p01 += dt * p11 + q01
+        p11 += q11
+
+    def _assign(self, detections: Detections, variance: Array) -> tuple[IntArray, IntArray]:
+        gap = self.state[:, None, :2] - detections.centre_px[None, :, :]
+        spread = self.covariance[:, :1] + variance[None, :]
+        distance = np.einsum("ijk,ijk->ij", gap, gap) / spread
+        allowed = (distance <= self._gate) & (self.class_id[:, None] == detections.class_id[None, :])
+        # A stale track has a wide gate: the log term keeps it from taking the detection of a sharp one.
+        cost = np.where(allowed, distance + 2.0 * np.log(spread / variance[None, :]), _UNMATCHED_COST)
+        rows, columns = linear_sum_assignment(cost)
+        kept = allowed[rows, columns]
+        return rows[kept], columns[kept]
+
+    def _correct(self, matched: IntArray, detections: Detections, variance: Array) -> None:
+        p00, p01, p11 = self.covariance.T
+        hit = matched >= 0
+        inverse = hit / (p00 + variance[matched])
+        gain_0, gain_1 = p00 * inverse, p01 * inverse
+        innovation = detections.centre_px[matched] - self.state[:, :2]
+        self.state[:, :2] += gain_0[:, None] * innovation
+        self.state[:, 2:] += gain_1[:, None] * innovation
+        p11 -= gain_1 * p01
+        p01 *= 1.0 - gain_0
+        p00 *= 1.0 - gain_0
+
+    def _bury(self) -> None:
+        cfg = self._cfg
+        limit = np.where(self.hits >= cfg.confirm_hits, cfg.max_predicted_frames, cfg.max_tentative_frames)
+        centre = self.state[:, :2]
+        alive = (self.missed <= limit) & ((centre > self._low) & (centre < self._high)).all(axis=1)
+        if not alive.all():
+            self._keep(alive)
+
+    def _keep(self, alive: BoolArray) -> None:
+        self.state, self.covariance = self.state[alive], self.covariance[alive]
+        self.history, self._labels = self.history[alive], self._labels[alive]
+        self._bind()
+
+    def _start(self, free: BoolArray, detections: Detections, variance: Array) -> None:
+        index = np.flatnonzero(free)
+        count = len(index)
+        state = np.zeros((count, 4))
+        state[:, :2] = detections.centre_px[index]
+        covariance = np.zeros((count, 3))
+        covariance[:, 0] = variance[index]
+        covariance[:, 2] = self._cfg.initial_speed_px_s**2
+        history = np.zeros((count, self._cfg.window_frames))
+        history[:, self._slot] = detections.score[index]
+        labels = np.zeros((count, 6), dtype=np.int64)
+        labels[:, 0] = np.arange(self._next_id, self._next_id + count)
+        labels[:, 1] = detections.class_id[index]
+        labels[:, 3] = 1
+        labels[:, 4] = -1
+        labels[:, 5] = index
+        self._next_id += count
+        self.state = np.concatenate([self.state, state])
+        self.covariance = np.concatenate([self.covariance, covariance])
+        self.history = np.concatenate([self.history, history])
+        self._labels = np.concatenate([self._labels, labels])
+        self._bind()
