@@ -61,6 +61,8 @@ class ActuatorCfg:
     """Unit direction of positive thrust, marine axes."""
     max_force_n: float = 0.0
     """Thrust at command 1."""
+    disc_diameter_m: float = 0.1
+    """Propeller diameter, for the power that the thrust costs."""
     time_constant_s: float = 0.1
     """First-order lag."""
     dead_band: float = 0.0

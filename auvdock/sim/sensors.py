@@ -1,0 +1,103 @@
+"""The vehicle's own sensors with noise and bias: pressure, compass, inclinometer, gyroscopes, DVL."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from auvdock.core.arrays import Array
+from auvdock.core.contracts import Proprioception
+from auvdock.core.errors import ConfigError
+
+__all__ = ["SensorCfg", "Sensors"]
+
+
+@dataclass(frozen=True)
+class SensorCfg:
+    """Noise of each sample (white) and bias (drawn once an episode); both are standard deviations."""
+
+    depth_noise_m: float = 0.01
+    """Pressure gauge, 0.01 % of a 100 m range (Paroscientific Digiquartz data sheet: accuracy 0.01 % of full scale)."""
+    depth_bias_m: float = 0.02
+    """Atmospheric pressure and tide left over after zeroing at the surface: 2 hPa."""
+    attitude_noise_rad: float = 0.0017
+    """Roll and pitch, 0.1° (TCM-class compass modules: 0.2° accuracy)."""
+    attitude_bias_rad: float = 0.0035
+    """Roll and pitch alignment, 0.2° (same data sheets)."""
+    heading_noise_rad: float = 0.0035
+    """Compass, 0.2° (TCM-class compass modules: 0.1° resolution, 0.05° repeatability, steel and currents near by)."""
+    heading_bias_rad: float = 0.0087
+    """Compass, 0.5° (OS5000- and TCM-class data sheets: 0.3° to 0.5° rms accuracy)."""
+    gyro_noise_rad_s: float = 0.0005
+    """MEMS gyroscope, 0.007 °/s/√Hz over 15 Hz (ADIS1648x data sheets)."""
+    gyro_bias_rad_s: float = 0.0002
+    """In-run bias after zeroing, about 40 °/h (same class, over temperature)."""
+    ground_velocity_noise_m_s: float = 0.003
+    """DVL bottom lock (Teledyne RDI Workhorse Navigator 1200 kHz: 0.3 cm/s at 1 m/s, single ping)."""
+    water_velocity_noise_m_s: float = 0.01
+    """DVL water track: shorter cells and fewer scatterers, some three times the bottom lock's."""
+    velocity_scale_error: float = 0.002
+    """DVL scale error (same data sheet: ±0.2 %)."""
+    contact_threshold_n: float = 5.0
+    """Force that closes the bow's touch switch."""
+
+    def __post_init__(self) -> None:
+        """Refuse negative deviations."""
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ConfigError(f"sim.sensors.{name}", value, "0 or more")
+
+
+class Sensors:
+    """Draws what the sensors say from the true state."""
+
+    def __init__(self, cfg: SensorCfg) -> None:
+        """Prepare; call `reset` before use."""
+        self._cfg = cfg
+        c = cfg
+        # One standard normal each: depth, roll, pitch, yaw, gyro, ground velocity, water velocity.
+        self._std = np.array(
+            [c.depth_noise_m, c.attitude_noise_rad, c.attitude_noise_rad, c.heading_noise_rad]
+            + [c.gyro_noise_rad_s] * 3
+            + [c.ground_velocity_noise_m_s] * 3
+            + [c.water_velocity_noise_m_s] * 3
+        )
+        self._bias_std = np.array(
+            [c.depth_bias_m, c.attitude_bias_rad, c.attitude_bias_rad, c.heading_bias_rad]
+            + [c.gyro_bias_rad_s] * 3
+            + [0.0] * 6
+        )
+        self.reset(np.random.default_rng(0))
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Draw this episode's biases; `rng` then belongs to the sensors."""
+        self._rng = rng
+        self._bias = self._bias_std * rng.standard_normal(13)
+        self._scale = 1.0 + self._cfg.velocity_scale_error * float(rng.standard_normal())
+
+    def sample(
+        self,
+        time_s: float,
+        depth_m: float,
+        euler_zyx_rad: tuple[float, float, float],
+        nu_body: Array,
+        nu_relative_body: Array,
+        bow_force_n: float,
+        latched: bool,
+    ) -> Proprioception:
+        """One sample of all sensors."""
+        error = self._bias + self._std * self._rng.standard_normal(13)
+        euler = np.array(euler_zyx_rad) + error[1:4]
+        euler[2] = math.remainder(float(euler[2]), 2.0 * math.pi)
+        return Proprioception(
+            time_s=time_s,
+            depth_m=depth_m + float(error[0]),
+            euler_zyx_rad=euler,
+            angular_velocity_rad_s=nu_body[3:] + error[4:7],
+            velocity_ground_m_s=self._scale * nu_body[:3] + error[7:10],
+            velocity_water_m_s=self._scale * nu_relative_body[:3] + error[10:13],
+            contact=bow_force_n > self._cfg.contact_threshold_n,
+            latched=latched,
+        )

@@ -1,0 +1,363 @@
+"""The simulator: one vehicle, one station and the water, stepped by MuJoCo with exact added mass."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from auvdock.core.arrays import Array, check_shape
+from auvdock.core.contracts import Proprioception
+from auvdock.core.errors import ConfigError
+from auvdock.core.station import ConicalStationCfg
+from auvdock.core.transforms import euler_zyx_from_rotation, make_transform
+from auvdock.core.vehicle import VehicleCfg, load_vehicle
+from auvdock.sim.actuation import Actuators
+from auvdock.sim.hydrodynamics import Hydrodynamics
+from auvdock.sim.latch import Latch
+from auvdock.sim.ocean import CurrentCfg, Ocean
+from auvdock.sim.scene import LATCH, VEHICLE, build_model
+from auvdock.sim.sensors import SensorCfg, Sensors
+from auvdock.sim.truth import Truth
+
+__all__ = ["HistoryEntry", "SimCfg", "Simulator"]
+
+_HISTORY_STEPS = 240
+_MAX_SPEED_M_S = 10.0
+_MAX_RATE_RAD_S = 50.0
+_MAX_DISTANCE_M = 200.0
+
+
+@dataclass(frozen=True)
+class SimCfg:
+    """Vehicle, current, sensors and physics rate."""
+
+    vehicle: str = "remus_hybrid"
+    """Vehicle preset."""
+    current: CurrentCfg = CurrentCfg()
+    sensors: SensorCfg = SensorCfg()
+    physics_hz: float = 120.0
+    """Physics steps a second."""
+
+    def __post_init__(self) -> None:
+        """Contacts need some 100 Hz; beyond 2000 Hz nothing is gained."""
+        if not 100.0 <= self.physics_hz <= 2000.0:
+            raise ConfigError("sim.physics_hz", self.physics_hz, "a rate of 100 to 2000 Hz")
+
+
+class HistoryEntry(NamedTuple):
+    """State before one step and the command given in it."""
+
+    time_s: float
+    qpos: list[float]
+    """Position (3) and quaternion wxyz (4) of the body in the world."""
+    qvel: list[float]
+    """Velocity over ground in the world frame (3), angular velocity in the body frame (3)."""
+    command: list[float]
+
+
+class Simulator:
+    """Steps the world; `truth` is for metrics, `proprioception` for the vehicle.
+
+    Each step: `mj_step1`, M_A into the free joint's 6×6 block of `data.M`, `mj_factorM`, the water's forces into
+    `qfrc_applied`, `mj_step2`. A state that is not finite or absurd (faster than 10 m/s or 50 rad/s, further than
+    200 m from the station) freezes the simulator: `truth.diverged` is True and `history` keeps the last 240 steps.
+
+    Attributes:
+        cfg: configuration.
+        station: the station.
+        vehicle: the vehicle.
+        model: the MuJoCo model; its own to each simulator.
+        T_world_station: (4, 4) pose of the station frame.
+        history: ring buffer of the last steps.
+    """
+
+    def __init__(self, cfg: SimCfg, station: ConicalStationCfg, vehicle: VehicleCfg | None = None) -> None:
+        """Build the world.
+
+        Args:
+            cfg: configuration.
+            station: the station.
+            vehicle: in place of the preset that `cfg.vehicle` names.
+
+        Raises:
+            ConfigError: no such vehicle, or data that does not fit.
+        """
+        self.cfg = cfg
+        self.station = station
+        self.vehicle = vehicle if vehicle is not None else load_vehicle(cfg.vehicle)
+        self._dt_s = 1.0 / cfg.physics_hz
+        self.model = build_model(self.vehicle, station, self._dt_s)
+        self._data = mujoco.MjData(self.model)
+        self.T_world_station = make_transform(np.eye(3), np.array([0.0, 0.0, -station.depth_m]))
+        self.history: deque[HistoryEntry] = deque(maxlen=_HISTORY_STEPS)
+        self._actuators = Actuators(self.vehicle, self._dt_s)
+        self._hydrodynamics = Hydrodynamics(self.vehicle, self._actuators.thrusters)
+        self._ocean = Ocean(cfg.current, station.depth_m, self._dt_s)
+        self._sensors = Sensors(cfg.sensors)
+        self._latch = Latch(station.latch, station.funnel)
+        self._hull = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, "hull")
+        self._floor = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, "floor")
+        self._weld = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_EQUALITY, LATCH)
+        self._body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
+        self._bind()
+        self.reset(np.array([10.0, 0.0, -station.depth_m]), np.array([0.0, 0.0, 0.0, 1.0]), np.random.default_rng(0))
+
+    def _bind(self) -> None:
+        """Views into MuJoCo's memory, so that the step need not look them up."""
+        data = self._data
+        self._qpos, self._qvel = data.qpos, data.qvel
+        self._mass = data.M[:21]
+        self._xmat = data.xmat[self._body].reshape(3, 3)
+        self._applied = data.qfrc_applied
+        self._constraint_force = data.qfrc_constraint[:3]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the views."""
+        views = ("_qpos", "_qvel", "_mass", "_xmat", "_applied", "_constraint_force")
+        return {key: value for key, value in self.__dict__.items() if key not in views}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore the views too."""
+        self.__dict__.update(state)
+        self._bind()
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data, with poses of bodies, geoms, cameras and lights brought up to the present state."""
+        if self._poses_stale:
+            mujoco.mj_kinematics(self.model, self._data)
+            mujoco.mj_comPos(self.model, self._data)
+            mujoco.mj_camlight(self.model, self._data)
+            self._poses_stale = False
+        return self._data
+
+    def reset(
+        self,
+        position_world_m: Array,
+        quat_wxyz: Array,
+        rng: np.random.Generator,
+        current: CurrentCfg | None = None,
+    ) -> None:
+        """Start an episode: at rest relative to the water, actuators at rest, latch open.
+
+        Args:
+            position_world_m: (3,) of the body frame's origin.
+            quat_wxyz: (4,) of the body frame; normalised here.
+            rng: spawns one generator for the water and one for the sensors.
+            current: in place of the configured one, for this episode.
+
+        Raises:
+            ValueError: wrong shapes, or a quaternion of no length.
+        """
+        check_shape("position_world_m", position_world_m, (3,))
+        check_shape("quat_wxyz", quat_wxyz, (4,))
+        length = float(np.linalg.norm(quat_wxyz))
+        if not length > 1e-6:
+            raise ValueError("quat_wxyz has no length")
+        water_rng, sensor_rng = rng.spawn(2)
+        mujoco.mj_resetData(self.model, self._data)
+        self._ocean.reset(current if current is not None else self.cfg.current, water_rng)
+        self._sensors.reset(sensor_rng)
+        self._actuators.reset()
+        self._latch.reset()
+        self._qpos[:3] = position_world_m
+        self._qpos[3:7] = quat_wxyz / length
+        self._qvel[:3] = self._ocean.velocity(float(position_world_m[2]))
+        self._steps = 0
+        self._diverged = False
+        self._contact_force_n = self._peak_contact_force_n = 0.0
+        self._energy_j = self._path_length_m = 0.0
+        self.history.clear()
+        mujoco.mj_forward(self.model, self._data)
+        self._poses_stale = False
+        self._observe()
+
+    def step(self, command: Array | Sequence[float]) -> None:
+        """Advance by one physics step under the actuator commands (n,) in [-1, 1].
+
+        Does nothing once diverged.
+
+        Raises:
+            ValueError: a command of the wrong length or with values that are not numbers.
+        """
+        if self._diverged:
+            return
+        model, data = self.model, self._data
+        state = self._actuators.step(command)
+        qpos: list[float] = self._qpos.tolist()
+        qvel: list[float] = self._qvel.tolist()
+        self.history.append(HistoryEntry(self.time_s, qpos, qvel, list(command)))
+        if _is_absurd(qpos, qvel):
+            self._diverged = True
+            return
+        mujoco.mj_step1(model, data)
+        rotation = self._xmat
+        water_x, water_y, water_z = self._ocean.velocity(qpos[2])
+        wrench, advance = self._hydrodynamics.wrench(
+            rotation.ravel().tolist(),
+            (qvel[0] - water_x, qvel[1] - water_y, qvel[2] - water_z),
+            qvel[3:],
+            self._ocean.step(),
+            state,
+        )
+        self._mass += self._hydrodynamics.added_mass_rows(rotation)
+        mujoco.mj_factorM(model, data)
+        self._applied[:] = wrench
+        mujoco.mj_step2(model, data)
+        self._poses_stale = True
+        self._steps += 1
+        self._energy_j += self._actuators.power_w(advance) * self._dt_s
+        self._path_length_m += math.sqrt(qvel[0] ** 2 + qvel[1] ** 2 + qvel[2] ** 2) * self._dt_s
+        self._note_contact()
+        self._observe()
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since reset."""
+        return self._steps * self._dt_s
+
+    @property
+    def truth(self) -> Truth:
+        """A snapshot of the true state."""
+        rotation, nu, nu_relative, water = self._motion()
+        entry = self._latch.entry
+        return Truth(
+            time_s=self.time_s,
+            T_world_body=make_transform(rotation, self._qpos[:3]),
+            nu_body=nu,
+            nu_relative_body=nu_relative,
+            current_world_m_s=water,
+            nose_station_m=np.array(self._nose_m),
+            axis_angle_rad=self._axis_angle_rad,
+            contact_force_n=self._contact_force_n,
+            peak_contact_force_n=self._peak_contact_force_n,
+            touching_station=self._touches_station(),
+            latched=self._latch.closed_at_s is not None,
+            docked=self._latch.docked,
+            entry_speed_m_s=entry.speed_m_s if entry else None,
+            entry_angle_rad=entry.angle_rad if entry else None,
+            entry_lateral_m=entry.lateral_m if entry else None,
+            entry_vertical_m=entry.vertical_m if entry else None,
+            energy_j=self._energy_j,
+            path_length_m=self._path_length_m,
+            diverged=self._diverged,
+        )
+
+    def proprioception(self) -> Proprioception:
+        """One noisy sample of the vehicle's own sensors; draws from the sensors' generator."""
+        rotation, nu, nu_relative, _ = self._motion()
+        return self._sensors.sample(
+            time_s=self.time_s,
+            depth_m=-float(self._qpos[2]),
+            euler_zyx_rad=euler_zyx_from_rotation(rotation),
+            nu_body=nu,
+            nu_relative_body=nu_relative,
+            bow_force_n=self._contact_force_n if self._nose_touches() else 0.0,
+            latched=self._latch.closed_at_s is not None,
+        )
+
+    def _motion(self) -> tuple[Array, Array, Array, Array]:
+        """Rotation body to world, ν over ground, ν relative to the water, water's velocity."""
+        w, x, y, z = self._qpos[3:7].tolist()
+        rotation = np.array(_rotation(w, x, y, z)).reshape(3, 3)
+        water = np.array(self._ocean.velocity(float(self._qpos[2])))
+        nu = np.concatenate([self._qvel[:3] @ rotation, self._qvel[3:6]])
+        nu_relative = np.concatenate([(self._qvel[:3] - water) @ rotation, self._qvel[3:6]])
+        return rotation, nu, nu_relative, water
+
+    def _observe(self) -> None:
+        """Nose, latch and divergence after a step or a reset."""
+        qpos: list[float] = self._qpos.tolist()
+        qvel: list[float] = self._qvel.tolist()
+        if _is_absurd(qpos, qvel):
+            self._diverged = True
+            self._nose_m, self._axis_angle_rad = (math.nan, math.nan, math.nan), math.nan
+            return
+        r00, r01, r02, r10, _, _, r20, _, _ = _rotation(*qpos[3:7])
+        reach = self.vehicle.nose_x_m
+        nose = qpos[0] + reach * r00, qpos[1] + reach * r10, qpos[2] + reach * r20 + self.station.depth_m
+        # The tube points along −x of the station frame, which is not turned against the world.
+        angle = math.atan2(math.hypot(r10, r20), -r00)
+        self._nose_m, self._axis_angle_rad = nose, angle
+        inward = -(qvel[0] + reach * (r01 * qvel[5] - r02 * qvel[4]))
+        if self._latch.update(self.time_s, nose, inward, angle):
+            self._close_latch(qpos)
+
+    def _close_latch(self, qpos: list[float]) -> None:
+        """Weld the body where it is, at the nose, as a pawl behind the bow would."""
+        reach = self.vehicle.nose_x_m
+        x, y, z = self._nose_m
+        weld = self.model.eq_data[self._weld]
+        weld[0:3] = x, y, z - self.station.depth_m
+        weld[3:6] = reach, 0.0, 0.0
+        w, qx, qy, qz = qpos[3:7]
+        weld[6:10] = w, -qx, -qy, -qz
+        weld[10] = 1.0
+        self._data.eq_active[self._weld] = 1
+
+    def _note_contact(self) -> None:
+        """Net contact force of the step just taken; the latch's hold is no contact."""
+        data = self._data
+        if data.ncon == 0:
+            self._contact_force_n = 0.0
+            return
+        if self._latch.closed_at_s is None:
+            x, y, z = self._constraint_force.tolist()
+            force = math.sqrt(x * x + y * y + z * z)
+        else:
+            total, one = np.zeros(3), np.zeros(6)
+            for index in range(data.ncon):
+                mujoco.mj_contactForce(self.model, data, index, one)
+                sign = 1.0 if int(data.contact.geom[index, 1]) == self._hull else -1.0
+                total += sign * (one[:3] @ data.contact.frame[index].reshape(3, 3))
+            force = math.sqrt(float(total @ total))
+        self._contact_force_n = force
+        self._peak_contact_force_n = max(self._peak_contact_force_n, force)
+
+    def _touches_station(self) -> bool:
+        data = self._data
+        if data.ncon == 0 or self._contact_force_n == 0.0:
+            return False
+        return bool(np.any(np.all(data.contact.geom != self._floor, axis=1) & (data.contact.dist < 0.0)))
+
+    def _nose_touches(self) -> bool:
+        """Whether a contact lies on the rounded nose."""
+        if self._data.ncon == 0 or self._contact_force_n == 0.0:
+            return False
+        offset = self._data.contact.pos - self._qpos[:3]
+        w, x, y, z = self._qpos[3:7].tolist()
+        r = _rotation(w, x, y, z)
+        return bool(np.any(offset @ np.array([r[0], r[3], r[6]]) > self.vehicle.nose_x_m - self.vehicle.radius_m))
+
+
+def _is_absurd(qpos: list[float], qvel: list[float]) -> bool:
+    """True unless all is finite, slow and near; written so that a NaN answers True."""
+    x, y, z, qw, qx, qy, qz = qpos
+    u, v, w, p, q, r = qvel
+    return not (
+        x * x + y * y + z * z < _MAX_DISTANCE_M**2
+        and u * u + v * v + w * w < _MAX_SPEED_M_S**2
+        and p * p + q * q + r * r < _MAX_RATE_RAD_S**2
+        and 0.5 < qw * qw + qx * qx + qy * qy + qz * qz < 2.0
+    )
+
+
+def _rotation(w: float, x: float, y: float, z: float) -> tuple[float, ...]:
+    """Rotation of a unit quaternion, row by row."""
+    return (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+        2 * (x * y + w * z),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - w * x),
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        1 - 2 * (x * x + y * y),
+    )

@@ -1,0 +1,57 @@
+"""The simulator's state as metrics may see it. Nothing here may reach perception or a controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from auvdock.core.arrays import Array
+
+__all__ = ["Truth"]
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """A snapshot of the true state.
+
+    Attributes:
+        time_s: simulated time since reset.
+        T_world_body: (4, 4) pose of the body frame (x forward, y port, z up, origin in the centre of buoyancy).
+        nu_body: (6,) velocity over ground, linear then angular, body axes, m/s and rad/s.
+        nu_relative_body: (6,) the same relative to the water.
+        current_world_m_s: (3,) velocity of the water at the vehicle.
+        nose_station_m: (3,) tip of the nose in the station frame.
+        axis_angle_rad: angle between the hull's axis and the tube's, 0 when pointing straight in.
+        contact_force_n: magnitude of the net contact force in the last step (its mean over the step).
+        peak_contact_force_n: the greatest so far.
+        touching_station: True while any part of the hull touches the station.
+        latched: True once the latch has closed.
+        docked: True once the latch has held for `hold_s` and the entry kept `LatchCfg`'s limits.
+        entry_speed_m_s: speed along the tube as the nose last passed the throat inwards; None before.
+        entry_angle_rad: `axis_angle_rad` at that moment; None before.
+        entry_lateral_m: sideways offset of the nose from the tube's axis at that moment, + to the right as the
+            entering vehicle sees it; None before.
+        entry_vertical_m: upward offset at that moment; None before.
+        energy_j: hydraulic work of the thrusters so far (`Actuators.power_w`).
+        path_length_m: distance over ground so far.
+        diverged: True once the state was not finite or absurd; the state then stays frozen.
+    """
+
+    time_s: float
+    T_world_body: Array
+    nu_body: Array
+    nu_relative_body: Array
+    current_world_m_s: Array
+    nose_station_m: Array
+    axis_angle_rad: float
+    contact_force_n: float
+    peak_contact_force_n: float
+    touching_station: bool
+    latched: bool
+    docked: bool
+    entry_speed_m_s: float | None
+    entry_angle_rad: float | None
+    entry_lateral_m: float | None
+    entry_vertical_m: float | None
+    energy_j: float
+    path_length_m: float
+    diverged: bool
