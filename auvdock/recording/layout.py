@@ -49,9 +49,10 @@ def _scene(setup: EpisodeSetup) -> rrb.Spatial3DView:
         background=[12, 26, 40],
         line_grid=rrb.LineGrid3D(
             plane=rr.components.Plane3D.XY.with_distance(z - setup.station.floor_below_m),
-            color=[255, 255, 255, 25],
+            spacing=5.0,
+            color=[90, 120, 140, 60],
         ),
-        eye_controls=rrb.EyeControls3D(position=(x + 9.0, y + 13.0, z + 7.0), look_target=(x + 6.0, y, z)),
+        eye_controls=rrb.EyeControls3D(position=(x + 10.0, y + 17.0, z + 6.5), look_target=(x + 6.5, y, z)),
         overrides={paths.PATH: until_now, paths.ESTIMATES: until_now},
     )
 
@@ -83,8 +84,15 @@ def _plots() -> rrb.Tabs:
 
 def _modes() -> rrb.Tabs:
     return rrb.Tabs(
-        rrb.StateTimelineView(name="Mode", origin=paths.MODE_STATE),
-        rrb.TextLogView(name="Mode changes", origin=paths.MODE_LOG),
+        rrb.Horizontal(
+            rrb.StateTimelineView(name="Mode", origin=paths.MODE_STATE),
+            rrb.TextLogView(
+                name="Mode changes",
+                origin=paths.MODE_LOG,
+                columns=rrb.TextLogColumns(timeline_columns=[paths.SIM_TIME], text_log_columns=["body"]),
+            ),
+            name="Mode",
+        ),
         _plot("Mode number", paths.MODE_NUMBER),
         rrb.TextDocumentView(name="Episode", origin=paths.SUMMARY),
         active_tab=0,

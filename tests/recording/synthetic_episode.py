@@ -4,32 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
-from auvdock.core.arrays import Array
-from auvdock.core.camera import Camera, CameraCfg, make_camera
+from auvdock.core.arrays import Array, Image
+from auvdock.core.camera import CameraCfg, make_camera
 from auvdock.core.contracts import BLUE, RED, Command, Detections, Percept, PoseEstimate, Proprioception, TrackView
 from auvdock.core.marine import flip_vector
 from auvdock.core.station import load_conical_station
 from auvdock.core.transforms import invert, make_transform, rotation_from_euler_zyx
 from auvdock.core.vehicle import load_vehicle
 from auvdock.episode.result import EpisodeResult
-
-
-@dataclass(frozen=True, eq=False)
-class Tick:
-    """Fields of `auvdock.episode.trace.Tick`."""
-
-    truth: Any
-    proprioception: Proprioception
-    image: Any
-    percept: Percept | None
-    command: Command
-
+from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.sim.truth import Truth
 
 POSE_OFFSET_STATION_M = np.array([-0.30, 0.10, 0.05])
 """What every estimated position is off by: along x, y, z of the station."""
@@ -37,8 +24,7 @@ YAW_ERROR_DEG = 2.0
 MODES = ("acquire", "far", "mid", "near", "terminal")
 
 
-def make_setup(width_px: int = 640, height_px: int = 360) -> Any:
-    """Shaped like `auvdock.episode.trace.EpisodeSetup`."""
+def make_setup(width_px: int = 640, height_px: int = 360) -> EpisodeSetup:
     vehicle = load_vehicle("remus_hybrid")
     station = load_conical_station()
     mount = vehicle.bow_camera
@@ -46,7 +32,7 @@ def make_setup(width_px: int = 640, height_px: int = 360) -> Any:
         CameraCfg(width_px=width_px, height_px=height_px),
         *(flip_vector(np.array(part)) for part in (mount.position_m, mount.direction, mount.up)),
     )
-    return SimpleNamespace(
+    return EpisodeSetup(
         title="synthetic approach",
         station=station,
         vehicle=vehicle,
@@ -57,8 +43,10 @@ def make_setup(width_px: int = 640, height_px: int = 360) -> Any:
     )
 
 
-def ticks(setup: Any, count: int, *, images: bool = False, lights: bool = True, rate_hz: float = 30.0) -> Iterator[Any]:
-    """Shaped like `auvdock.episode.trace.Tick`: from 20 m out to the mouth in `count` control periods.
+def ticks(
+    setup: EpisodeSetup, count: int, *, images: bool = False, lights: bool = True, rate_hz: float = 30.0
+) -> Iterator[Tick]:
+    """From 20 m out to the mouth in `count` control periods.
 
     Every fourth pose is predicted instead of measured; without `lights` there are neither detections nor poses.
     """
@@ -73,14 +61,26 @@ def ticks(setup: Any, count: int, *, images: bool = False, lights: bool = True, 
         T_world_body = setup.T_world_station @ T_station_body
         current = np.array([0.0, 0.2 + 0.05 * math.sin(9.0 * share), 0.0])
         velocity = T_world_body[:3, :3].T @ np.array([-1.0, 0.0, 0.0])
-        truth = SimpleNamespace(
+        truth = Truth(
             time_s=index / rate_hz,
             T_world_body=T_world_body,
             nu_body=np.concatenate([velocity, np.zeros(3)]),
             nu_relative_body=np.concatenate([velocity - T_world_body[:3, :3].T @ current, np.zeros(3)]),
             current_world_m_s=current,
             nose_station_m=(T_station_body @ np.array([setup.vehicle.nose_x_m, 0.0, 0.0, 1.0]))[:3],
+            axis_angle_rad=abs(0.1 * math.cos(4.0 * share)),
             contact_force_n=80.0 if share > 0.97 else 0.0,
+            peak_contact_force_n=80.0 if share > 0.97 else 0.0,
+            touching_station=share > 0.97,
+            latched=False,
+            docked=False,
+            entry_speed_m_s=None,
+            entry_angle_rad=None,
+            entry_lateral_m=None,
+            entry_vertical_m=None,
+            energy_j=0.0,
+            path_length_m=20.0 * share,
+            diverged=False,
         )
         yield Tick(
             truth=truth,
@@ -121,15 +121,15 @@ def make_result(*, success: bool = True) -> EpisodeResult:
     )
 
 
-def _image(backdrop: Array, index: int) -> np.ndarray:
+def _image(backdrop: Array, index: int) -> Image:
     return np.roll(backdrop, 17 * index, axis=1).astype(np.uint8)
 
 
-def _percept(setup: Any, T_station_body: Array, index: int, rate_hz: float, lights: bool) -> Percept:
+def _percept(setup: EpisodeSetup, T_station_body: Array, index: int, rate_hz: float, lights: bool) -> Percept:
     time_s = index / rate_hz
     if not lights:
         return Percept(time_s, None, None, None, 0, Detections.empty())
-    camera: Camera = setup.camera
+    camera = setup.camera
     T_station_camera = T_station_body @ camera.T_body_camera
     points = setup.station.layout.positions_m
     in_camera = (invert(T_station_camera) @ np.column_stack([points, np.ones(len(points))]).T).T[:, :3]
