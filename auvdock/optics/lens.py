@@ -1,0 +1,78 @@
+"""What the camera's geometry means for light: aperture, solid angle per pixel, angles around a pixel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.camera import Camera
+from auvdock.optics.settings import ImagingCfg
+
+__all__ = ["Lens"]
+
+
+class Lens:
+    """A camera's geometry, precomputed once on a coarse grid of pixels.
+
+    Attributes:
+        factor: image pixels per coarse pixel (4 at 640 × 360).
+        shape: (rows, columns) of the coarse grid.
+        rays: (rows × columns, 3) unit rays through the coarse pixels' centres.
+        metric: (rows, columns, 3) tensor g11, g12, g22: an offset (x, y) px subtends √(g11 x² + 2 g12 x y + g22 y²).
+        solid_angle_sr: (rows, columns) solid angle of one image pixel, √det g.
+        aperture_m2: area of the entrance pupil times the lens' transmission.
+        rad_per_px: angle of a pixel in the middle of the image.
+    """
+
+    def __init__(self, camera: Camera, cfg: ImagingCfg) -> None:
+        """Precompute the maps."""
+        self.camera = camera
+        self.factor = max(1, round(camera.width_px / 160))
+        columns, rows = -(-camera.width_px // self.factor), -(-camera.height_px // self.factor)
+        self.shape = (rows, columns)
+        self._x = (np.arange(columns) + 0.5) * self.factor - 0.5
+        self._y = (np.arange(rows) + 0.5) * self.factor - 0.5
+        x, y = (grid.ravel() for grid in np.meshgrid(self._x, self._y))
+        self.rays = camera.rays(np.column_stack([x, y]))
+        along_x = camera.rays(np.column_stack([x + 0.5, y])) - camera.rays(np.column_stack([x - 0.5, y]))
+        along_y = camera.rays(np.column_stack([x, y + 0.5])) - camera.rays(np.column_stack([x, y - 0.5]))
+        g11, g12, g22 = (
+            np.einsum("ij,ij->i", one, other)
+            for one, other in ((along_x, along_x), (along_x, along_y), (along_y, along_y))
+        )
+        self.metric = np.column_stack([g11, g12, g22]).reshape(rows, columns, 3)
+        self.solid_angle_sr = np.sqrt(g11 * g22 - g12 * g12).reshape(rows, columns)
+        focal_px = float(camera.matrix[0, 0])
+        self.rad_per_px = 1.0 / focal_px
+        focal_m = focal_px * cfg.sensor_width_m / camera.width_px
+        self.aperture_m2 = math.pi / 4.0 * (focal_m / cfg.f_number) ** 2 * cfg.lens_transmission
+        corner = camera.normalise(np.array([[-0.5, -0.5], [camera.width_px - 0.5, camera.height_px - 0.5]]))
+        self._max_tangent2 = float(np.max(np.sum(corner**2, axis=1)))
+
+    def metric_at(self, pixels: Array) -> Array:
+        """(n, 3) metric tensors at pixels (n, 2); outside the image those of the border."""
+        columns = np.clip((pixels[:, 0] / self.factor).astype(np.int64), 0, self.shape[1] - 1)
+        rows = np.clip((pixels[:, 1] / self.factor).astype(np.int64), 0, self.shape[0] - 1)
+        return self.metric[rows, columns]
+
+    def locate(self, rays: Array, margin_px: float = 0.0) -> tuple[Array, BoolArray]:
+        """Pixels (n, 2) of rays (n, 3) in the camera frame and whether they lie within `margin_px` of the image.
+
+        Rays beyond the image's corners (by more than the margin) have no meaningful pixel: the distortion polynomial
+        folds back there.
+        """
+        depth = np.maximum(rays[:, 2], 1e-9)
+        tangent2 = (rays[:, 0] ** 2 + rays[:, 1] ** 2) / (depth * depth)
+        slack = (1.0 + margin_px * self.rad_per_px) ** 2
+        near = tangent2 <= self._max_tangent2 * slack
+        pixels = self.camera.project(np.where(near[:, None], rays, _AHEAD))
+        edge = 0.5 + margin_px
+        x, y = pixels[:, 0], pixels[:, 1]
+        inside = (x >= -edge) & (x < self.camera.width_px - 1 + edge)
+        inside &= (y >= -edge) & (y < self.camera.height_px - 1 + edge)
+        return pixels, inside & near
+
+
+_AHEAD = np.array([0.0, 0.0, 1.0])

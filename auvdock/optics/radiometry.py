@@ -1,0 +1,106 @@
+"""What each light sends into the camera: unscattered core and scattered halo, from any pose.
+
+One computation serves the renderer, the `beacons` fidelity and planners.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from auvdock.core.arrays import Array
+from auvdock.core.beacons import BeaconCfg, BeaconLayout
+from auvdock.optics.bands import electrons_per_joule
+from auvdock.optics.light import peak_intensity_w_sr
+from auvdock.optics.water import WaterCfg
+
+__all__ = ["LightSet", "Received"]
+
+
+@dataclass(frozen=True, eq=False)
+class Received:
+    """Light at the camera, per lamp.
+
+    Attributes:
+        ray_camera: (n, 3) unit directions to the lamps in the camera frame.
+        range_m: (n,) distances.
+        scattering_depth: (n,) b r.
+        core_w_m2: (n,) irradiance of the unscattered light, normal to the ray: I f(θ) e^{-(a+b) r} / r².
+        halo_w_m2: (n,) irradiance of the forward-scattered light: I f(θ) e^{-a r} (1 - e^{-b r}) / r².
+    """
+
+    ray_camera: Array
+    range_m: Array
+    scattering_depth: Array
+    core_w_m2: Array
+    halo_w_m2: Array
+
+
+class LightSet:
+    """Lamps in one water, in the station frame.
+
+    A lamp that is set back behind the plane of the array sits inside the funnel whose rim carries the array: from
+    outside it is seen through the mouth only.
+    """
+
+    def __init__(
+        self,
+        layout: BeaconLayout,
+        water: WaterCfg,
+        extra: Sequence[BeaconCfg] = (),
+        path_loss: Sequence[float] = (),
+    ) -> None:
+        """Precompute what does not depend on the pose.
+
+        Args:
+            layout: the station's beacons; they come first.
+            water: the water between lamps and camera.
+            extra: further lamps, in the station frame.
+            path_loss: for each of `extra` a factor on its light, such as a reflectance.
+        """
+        lamps = (*layout.beacons, *extra)
+        self.count = len(lamps)
+        self.station_count = len(layout.beacons)
+        self.positions_m = np.array([lamp.position_m for lamp in lamps], dtype=np.float64)
+        axes = np.array([lamp.axis for lamp in lamps], dtype=np.float64)
+        self.axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+        loss = np.concatenate([np.ones(self.station_count), np.asarray(path_loss, dtype=np.float64)])
+        self.peak_w_sr = np.array([peak_intensity_w_sr(lamp) for lamp in lamps]) * loss
+        self.flux_w = np.array([lamp.power_w * lamp.efficiency for lamp in lamps]) * loss
+        half = np.radians([lamp.beam_angle_deg for lamp in lamps]) / 2.0
+        self._minus_profile = -math.log(2.0) / half**2
+        self.absorption_per_m = np.array([water.absorption_at(lamp.wavelength_nm) for lamp in lamps])
+        self.scattering_per_m = np.array([water.scattering_at(lamp.wavelength_nm) for lamp in lamps])
+        self.electrons_per_j = np.array([electrons_per_joule(lamp.wavelength_nm) for lamp in lamps])
+        array = layout.array_positions_m
+        self._rim_x = float(np.mean(array[:, 0]))
+        self._rim_centre = array[:, 1:].mean(axis=0)
+        self._rim_radius2 = float(np.max(np.sum((array[:, 1:] - self._rim_centre) ** 2, axis=1)))
+        setback = self._rim_x - self.positions_m[:, 0]
+        inside = np.sum((self.positions_m[:, 1:] - self._rim_centre) ** 2, axis=1) < self._rim_radius2
+        self._recessed = np.flatnonzero((setback > 0.05) & inside)
+        self._setback = setback[self._recessed]
+        self._recessed_yz = self.positions_m[self._recessed, 1:] - self._rim_centre
+
+    def received(self, T_station_camera: Array) -> Received:
+        """Core and halo irradiance of every lamp at a camera pose (4, 4)."""
+        camera = T_station_camera[:3, 3]
+        offset = self.positions_m - camera
+        r2 = np.einsum("ij,ij->i", offset, offset)
+        r = np.sqrt(np.maximum(r2, 1e-4))
+        ray = offset / r[:, None]
+        cosine = np.einsum("ij,ij->i", ray, self.axes)
+        angle = np.arccos(np.clip(-cosine, -1.0, 1.0))
+        total = self.peak_w_sr * np.exp(self._minus_profile * angle * angle - self.absorption_per_m * r) / (r * r)
+        ahead = float(camera[0]) - self._rim_x
+        if ahead > 0.0 and len(self._recessed):
+            share = (self._setback / (self._setback + ahead))[:, None]
+            crossing = self._recessed_yz * (1.0 - share) + (camera[1:] - self._rim_centre) * share
+            hidden = np.einsum("ij,ij->i", crossing, crossing) > self._rim_radius2
+            total[self._recessed[hidden]] = 0.0
+        depth = self.scattering_per_m * r
+        core = total * np.exp(-depth)
+        return Received(ray @ T_station_camera[:3, :3], r, depth, core, total - core)

@@ -1,0 +1,111 @@
+"""The image sensor: electrons to 8 bits, with shot noise, read noise and saturation.
+
+With mean signal e and read noise σ_r, an electron count has variance e + σ_r². In u = √(e + σ_r²) that noise has the
+standard deviation 1/2 at every level (Anscombe 1948), so noise costs one addition: u' = u + n/2 with n from a tile of
+standard normal numbers, drawn once per reset and read at a random offset per frame. The output code is
+
+    DN = 255 (u' - σ_r) / (√(full well / gain + σ_r²) - σ_r)     for the encoding "sqrt",
+    DN = 255 (u'² - σ_r²) gain / full well                       for "linear",
+
+rounded and clipped to 0…255. In both, the decoded electrons have a variance that is linear in their mean, slope 1.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from auvdock.core.arrays import Array, Image
+from auvdock.optics.settings import ImagingCfg
+
+__all__ = ["SATURATED_CODE", "Sensor", "SensorScale", "saturated_share"]
+
+SATURATED_CODE = 250
+"""Samples from this code upwards count as saturated in the exposure metering."""
+_SPARE_PX = 64
+
+
+class SensorScale:
+    """The code's scale at one exposure: electrons ↔ DN, without noise."""
+
+    def __init__(self, cfg: ImagingCfg, gain: float) -> None:
+        """Precompute the constants."""
+        self._linear = cfg.encoding == "linear"
+        self._read2 = cfg.read_noise_e**2
+        self.read_e = cfg.read_noise_e
+        self.full_scale_e = cfg.full_well_e / gain
+        self.dn_per_root = 255.0 / (math.sqrt(self.full_scale_e + self._read2) - cfg.read_noise_e)
+        self.saturated_e = float(self.electrons(np.array([SATURATED_CODE]))[0])
+
+    def codes(self, electrons: Array) -> Array:
+        """Unrounded, unclipped codes of electrons, any shape."""
+        if self._linear:
+            return electrons * (255.0 / self.full_scale_e)
+        return (np.sqrt(electrons + self._read2) - self.read_e) * self.dn_per_root
+
+    def electrons(self, codes: Array) -> Array:
+        """Electrons of codes, any shape; inverse of `codes`."""
+        if self._linear:
+            return codes * (self.full_scale_e / 255.0)
+        return (codes / self.dn_per_root + self.read_e) ** 2 - self._read2
+
+    def noise_dn(self, electrons: Array) -> Array:
+        """Standard deviation of the code at a signal in electrons, quantisation included."""
+        if self._linear:
+            return np.sqrt((electrons + self._read2) * (255.0 / self.full_scale_e) ** 2 + 1.0 / 12.0)
+        return np.full_like(electrons, math.sqrt(0.25 * self.dn_per_root**2 + 1.0 / 12.0))
+
+
+class Sensor:
+    """Turns a buffer of electrons into the image."""
+
+    def __init__(self, width_px: int, height_px: int, cfg: ImagingCfg) -> None:
+        """Allocate nothing but sizes; the noise tile comes with `reset`."""
+        self._cfg = cfg
+        self._size = (height_px, width_px)
+        self._tile: NDArray[np.float32] | None = None
+        self._rng = np.random.default_rng(0)
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Take a generator of its own and draw the noise tile."""
+        self._rng = rng
+        height, width = self._size
+        if self._cfg.noise:
+            shape = (height + _SPARE_PX, width + _SPARE_PX, 3)
+            self._tile = rng.standard_normal(shape, dtype=np.float32)
+
+    def expose(self, electrons: NDArray[np.float32], gain: float) -> Image:
+        """Image (H, W, 3) uint8 of mean electrons (H, W, 3) float32; the buffer is overwritten."""
+        cfg = self._cfg
+        scale = SensorScale(cfg, gain)
+        height, width = self._size
+        electrons += np.float32(cfg.read_noise_e**2)
+        root = cv2.sqrt(electrons, electrons)
+        image = np.empty((height, width, 3), dtype=np.uint8)
+        if cfg.noise and self._tile is not None:
+            y, x = self._rng.integers(0, _SPARE_PX + 1, 2)
+            tile = self._tile[y : y + height, x : x + width]
+        else:
+            tile = None
+        if cfg.encoding == "sqrt":
+            k = scale.dn_per_root
+            if tile is None:
+                cv2.addWeighted(root, k, root, 0.0, -k * cfg.read_noise_e, image, cv2.CV_8U)
+            else:
+                cv2.addWeighted(root, k, tile, 0.5 * k, -k * cfg.read_noise_e, image, cv2.CV_8U)
+            return image
+        if tile is not None:
+            cv2.scaleAdd(tile, 0.5, root, root)
+        k = 255.0 / scale.full_scale_e
+        square = cv2.multiply(root, root, root)
+        cv2.addWeighted(square, k, square, 0.0, -k * cfg.read_noise_e**2, image, cv2.CV_8U)
+        return image
+
+
+def saturated_share(image: Image) -> float:
+    """Share of an image's samples at or above `SATURATED_CODE`."""
+    flat = image.reshape(image.shape[0], -1)
+    return cv2.countNonZero(cv2.threshold(flat, SATURATED_CODE - 1, 255, cv2.THRESH_BINARY)[1]) / flat.size

@@ -1,0 +1,85 @@
+"""A light as a spot on the sensor: its radial profile in electrons, and how much of the image it saturates."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from auvdock.core.arrays import Array
+from auvdock.optics.halo import halo_table
+from auvdock.optics.lens import Lens
+from auvdock.optics.radiometry import LightSet, Received
+from auvdock.optics.settings import ImagingCfg
+from auvdock.optics.water import WaterCfg
+
+__all__ = ["SpotModel", "Spots"]
+
+_RADII = 32
+
+
+class Spots:
+    """Radial profiles of the lights in view, in electrons per second and pixel.
+
+    Attributes:
+        core: (m,) core irradiance, W/m².
+        halo: (m,) halo irradiance, W/m².
+        sigma_px: (m,) width of the core on the sensor.
+        profile: (m, k) irradiance per pixel at `SpotModel.radii_px`, W/m² per pixel.
+        channel: (m, 3) electrons per second for 1 W/m² on a pixel: red, green, blue.
+    """
+
+    __slots__ = ("channel", "core", "halo", "profile", "sigma_px")
+
+    def __init__(self, core: Array, halo: Array, sigma_px: Array, profile: Array, channel: Array) -> None:
+        """Hold the arrays."""
+        self.core, self.halo, self.sigma_px, self.profile, self.channel = core, halo, sigma_px, profile, channel
+
+
+class SpotModel:
+    """Spreads core and halo over the sensor, radially symmetric about each light.
+
+    The core is a Gaussian: the lens' point spread function widened by the lamp's face, σ² = σ_lens² + (R / (2 r) f)²
+    (a uniform disc of radius R has variance R²/4 per axis).
+    """
+
+    def __init__(self, lens: Lens, lights: LightSet, water: WaterCfg, cfg: ImagingCfg) -> None:
+        """Tabulate the halo at fixed radii."""
+        self.radii_px = np.geomspace(0.35, 0.45 * lens.camera.width_px, _RADII)
+        edges = np.concatenate([[0.0], np.sqrt(self.radii_px[1:] * self.radii_px[:-1]), self.radii_px[-1:]])
+        self.ring_px2 = math.pi * np.diff(edges**2)
+        self._minus_half_r2 = -0.5 * self.radii_px**2
+        self._log_first = math.log(self.radii_px[0])
+        self._log_step = math.log(self.radii_px[1] / self.radii_px[0])
+        table = halo_table(water.scattering_angle_rad)
+        self._table = table
+        self._rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
+        self._lens_sigma2 = cfg.lens_sigma_px**2
+        self._lamp_px_m2 = (cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2
+        self._channel = lights.electrons_per_j * lens.aperture_m2
+        self._samples = lens.camera.width_px * lens.camera.height_px * 3
+
+    def sigma_px(self, range_m: Array) -> Array:
+        """(n,) standard deviation of the core on the sensor."""
+        return np.sqrt(self._lens_sigma2 + self._lamp_px_m2 / (range_m * range_m))
+
+    def spots(self, received: Received, index: Array, factor: Array | float = 1.0) -> Spots:
+        """Profiles of the lights `index` (m,); `factor` scales each light (scintillation)."""
+        core, halo = received.core_w_m2[index] * factor, received.halo_w_m2[index] * factor
+        sigma2 = self._lens_sigma2 + self._lamp_px_m2 / received.range_m[index] ** 2
+        row, weight = self._table.row_of(received.scattering_depth[index])
+        lower = self._rows[row]
+        profile = lower + (self._rows[row + 1] - lower) * weight[:, None]
+        profile *= halo[:, None]
+        gauss = np.exp(self._minus_half_r2 / sigma2[:, None])
+        gauss *= (core / (2.0 * math.pi * sigma2))[:, None]
+        profile += gauss
+        return Spots(core, halo, np.sqrt(sigma2), profile, self._channel[index])
+
+    def saturated_share(self, spots: Spots, full_scale_e_s: float) -> float:
+        """Share of the image's samples above a level in electrons per second; overlap of spots is not counted."""
+        level = spots.profile[:, :, None] * spots.channel[:, None, :]
+        level *= 2.5 / full_scale_e_s
+        level -= 2.0
+        np.clip(level, 0.0, 1.0, out=level)
+        return float(self.ring_px2 @ level.sum(axis=(0, 2))) / self._samples

@@ -1,0 +1,110 @@
+"""Waters as data: absorption and scattering per band, and the shape of forward scattering."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from auvdock.assets import asset
+from auvdock.core.arrays import Array
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import load_toml
+from auvdock.optics.bands import BANDS_NM, interpolate_bands
+
+__all__ = ["WaterCfg", "load_water", "with_attenuation"]
+
+
+@dataclass(frozen=True)
+class WaterCfg:
+    """Inherent optical properties of a homogeneous water in the bands 450, 530 and 620 nm."""
+
+    name: str
+    """Name of the preset."""
+    source: str
+    """Where the figures come from and which of them are interpolated."""
+    absorption_per_m: tuple[float, float, float]
+    """Absorption coefficient a in 1/m per band."""
+    scattering_per_m: tuple[float, float, float]
+    """Scattering coefficient b in 1/m per band."""
+    scattering_angle_rad: float = 0.05
+    """θ0 of Wells (1973), 0.02 to 0.1: one scattering event deflects by less than 1.7 θ0 half of the time."""
+    backscatter_ratio: float = 0.018
+    """Backward over total scattering, b_b / b (Petzold 1972, average particle)."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no water can be."""
+        for name in ("absorption_per_m", "scattering_per_m"):
+            if not all(math.isfinite(value) and value >= 0.0 for value in getattr(self, name)):
+                raise ConfigError(f"water.{name}", getattr(self, name), "three coefficients of 0 1/m or more")
+        if not 0.001 <= self.scattering_angle_rad <= 0.5:
+            raise ConfigError("water.scattering_angle_rad", self.scattering_angle_rad, "an angle of 0.001 to 0.5 rad")
+        if not 0.0 <= self.backscatter_ratio <= 0.5:
+            raise ConfigError("water.backscatter_ratio", self.backscatter_ratio, "a fraction of 0 to 0.5")
+
+    @property
+    def absorption(self) -> Array:
+        """(3,) a per band, 1/m."""
+        return np.array(self.absorption_per_m)
+
+    @property
+    def scattering(self) -> Array:
+        """(3,) b per band, 1/m."""
+        return np.array(self.scattering_per_m)
+
+    @property
+    def attenuation(self) -> Array:
+        """(3,) c = a + b per band, 1/m."""
+        return self.absorption + self.scattering
+
+    @property
+    def backscattering(self) -> Array:
+        """(3,) b_b per band, 1/m."""
+        return self.scattering * self.backscatter_ratio
+
+    @property
+    def diffuse_attenuation(self) -> Array:
+        """(3,) K_d of downwelling daylight, 1/m: √(a² + 0.256 a b) (Kirk 1984, equation 7, light from the zenith)."""
+        return np.sqrt(self.absorption**2 + 0.256 * self.absorption * self.scattering)
+
+    def absorption_at(self, wavelength_nm: float) -> float:
+        """Absorption in 1/m at a wavelength, linear between the bands."""
+        return interpolate_bands(self.absorption, wavelength_nm)
+
+    def scattering_at(self, wavelength_nm: float) -> float:
+        """Scattering in 1/m at a wavelength, linear between the bands."""
+        return interpolate_bands(self.scattering, wavelength_nm)
+
+
+def load_water(name: str) -> WaterCfg:
+    """A water preset by name: Jerlov "I" to "9C", "clear", "pool" or "lake".
+
+    Raises:
+        ConfigError: no such preset, or a file that does not fit.
+    """
+    return load_toml(WaterCfg, asset("waters", name))
+
+
+def with_attenuation(water: WaterCfg, c_450: float) -> WaterCfg:
+    """The same water more or less turbid: b is scaled in all bands so that c(450 nm) = a + b is as given.
+
+    Turbidity moves scattering and leaves absorption alone. A water without scattering gets b ∝ 1/λ.
+
+    Raises:
+        ConfigError: not finite, or below the water's absorption at 450 nm.
+    """
+    a_450, b_450 = water.absorption_per_m[0], water.scattering_per_m[0]
+    if not math.isfinite(c_450) or c_450 < a_450:
+        raise ConfigError(
+            "water.attenuation",
+            c_450,
+            f"a finite attenuation of at least {a_450:g} 1/m, the absorption of {water.name!r} at 450 nm",
+        )
+    b_new = c_450 - a_450
+    if b_450 > 0.0:
+        blue, green, red = (b * b_new / b_450 for b in water.scattering_per_m)
+    else:
+        blue, green, red = (b_new * BANDS_NM[0] / nm for nm in BANDS_NM)
+    return dataclasses.replace(water, scattering_per_m=(blue, green, red))
