@@ -1,0 +1,361 @@
+"""The conical station's pilot: percepts and proprioception in, actuator commands out, no hidden state."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from auvdock.controllers.allocation import AllocationCfg, ThrustAllocator
+from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotState
+from auvdock.controllers.guidance import GuidanceCfg, corridor_m, sway_reach_m_s
+from auvdock.controllers.modes import (
+    ABORT,
+    ACQUIRE,
+    DOCKED,
+    FAR,
+    MID,
+    NEAR,
+    TERMINAL,
+    Facts,
+    ModeCfg,
+    next_mode,
+)
+from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
+from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rotation_zyx
+from auvdock.controllers.steering import (
+    Place,
+    SearchCfg,
+    Sight,
+    Steering,
+    along_axis,
+    back_off,
+    search,
+    search_pattern,
+    towards_light,
+)
+from auvdock.core.camera import Camera
+from auvdock.core.contracts import Bearing, Command, Percept, Proprioception
+from auvdock.core.station import ConicalStationCfg
+from auvdock.core.vehicle import VehicleCfg
+
+__all__ = ["ConicalPilot", "ControlCfg", "Pilot", "PilotState"]
+
+S = TypeVar("S")
+
+
+class Pilot(Protocol[S]):
+    """Flies a vehicle. Pure: all that it remembers is in the state that it is handed and hands back."""
+
+    def initial_state(self) -> S:
+        """State before the first step."""
+        ...
+
+    def step(self, state: S, percept: Percept | None, proprioception: Proprioception) -> tuple[Command, S]:
+        """One control period; `percept` is None when no new frame arrived."""
+        ...
+
+
+@dataclass(frozen=True)
+class ControlCfg:
+    """Everything that can be set about the pilot."""
+
+    autopilot: AutopilotCfg = field(default_factory=AutopilotCfg)
+    """Loops and their limits."""
+    allocation: AllocationCfg = field(default_factory=AllocationCfg)
+    """Wrench to actuators."""
+    filter: FilterCfg = field(default_factory=FilterCfg)
+    """Relative state."""
+    guidance: GuidanceCfg = field(default_factory=GuidanceCfg)
+    """Line of sight, speeds, corridor."""
+    search: SearchCfg = field(default_factory=SearchCfg)
+    """Looking around."""
+    modes: ModeCfg = field(default_factory=ModeCfg)
+    """Mode machine."""
+
+
+class PilotState(NamedTuple):
+    """All that the pilot remembers; immutable.
+
+    Attributes:
+        mode: current mode.
+        since_s: when it began; None before the first step.
+        attempts: approaches begun.
+        giving_up: no attempt is left.
+        relative: place before the station, None before the first pose.
+        sight: last far light, None before the first.
+        autopilot: integrals and references of the loops.
+        integrals: of the cross-track laws, port and up.
+        offset_rad: wanted heading relative to the axis.
+        anchor_rad, anchor_depth_m: heading and depth when the mode began.
+        side: where a search turns first, +1 is port.
+        best_m, best_s: least distance in near or terminal, and when it was reached.
+        gate_s: when the vehicle came to the gate in mid, None if it is not there.
+    """
+
+    mode: str
+    since_s: float | None
+    attempts: int
+    giving_up: bool
+    relative: RelativeState | None
+    sight: Sight | None
+    autopilot: AutopilotState
+    integrals: tuple[float, float]
+    offset_rad: float
+    anchor_rad: float
+    anchor_depth_m: float
+    side: float
+    best_m: float
+    best_s: float
+    gate_s: float | None
+
+
+class ConicalPilot:
+    """Pilot of paper A's docking: far lamp, array pose, red lamps, tube; see `modes` for the stages."""
+
+    def __init__(
+        self, cfg: ControlCfg, vehicle: VehicleCfg, station: ConicalStationCfg, camera: Camera, dt_s: float
+    ) -> None:
+        """Derive gains and precompute geometry.
+
+        Args:
+            cfg: settings.
+            vehicle: what is published of the vehicle.
+            station: what the vehicle has been told of the station.
+            camera: the bow camera with its mounting.
+            dt_s: control period.
+
+        Raises:
+            ConfigError: the loops cannot reach their margins.
+        """
+        self.cfg = cfg
+        self.autopilot = Autopilot(vehicle, cfg.autopilot, dt_s)
+        self.allocator = ThrustAllocator(vehicle, cfg.allocation)
+        self._dt_s = dt_s
+        self._filter = RelativeFilter(cfg.filter, camera.T_body_camera, dt_s)
+        self._R_body_camera = np.ascontiguousarray(camera.T_body_camera[:3, :3])
+        lever = camera.T_body_camera[:3, 3]
+        self._camera_to_nose: Vector = (vehicle.nose_x_m - float(lever[0]), -float(lever[1]), -float(lever[2]))
+        layout = station.layout
+        far = layout.indices("long_range")
+        self._lamp_height_m = float(np.mean(layout.positions_m[list(far), 2])) if far else 0.0
+        entrance = layout.indices("entrance")
+        centre = layout.positions_m[list(entrance)].mean(axis=0) if entrance else np.array([-1.0, 0.0, 0.0])
+        self._entrance_m: Vector = (float(centre[0]), float(centre[1]), float(centre[2]))
+        self._has_entrance = bool(entrance)
+        self._reach_m_s = sway_reach_m_s(vehicle, cfg.guidance.mid_speed_m_s, cfg.guidance.sway_share)
+        self._pattern = search_pattern(cfg.search)
+        self._idle = np.zeros(len(vehicle.actuators))
+
+    def initial_state(self) -> PilotState:
+        """Searching, with nothing known."""
+        return PilotState(
+            mode=ACQUIRE,
+            since_s=None,
+            attempts=1,
+            giving_up=False,
+            relative=None,
+            sight=None,
+            autopilot=self.autopilot.initial_state(),
+            integrals=(0.0, 0.0),
+            offset_rad=0.0,
+            anchor_rad=0.0,
+            anchor_depth_m=0.0,
+            side=1.0,
+            best_m=math.inf,
+            best_s=0.0,
+            gate_s=None,
+        )
+
+    def step(
+        self, state: PilotState, percept: Percept | None, proprioception: Proprioception
+    ) -> tuple[Command, PilotState]:
+        """One control period: estimate, judge the mode, steer, allocate."""
+        senses = read_senses(proprioception)
+        if state.since_s is None:
+            state = state._replace(
+                since_s=senses.time_s, anchor_rad=senses.yaw_rad, anchor_depth_m=senses.depth_m, best_s=senses.time_s
+            )
+        relative = self._track(state.relative, percept, senses)
+        sight = self._look(state.sight, percept, senses)
+        place = self._place(relative, senses) if relative is not None else None
+        state = self._progress(state, place, senses.time_s)._replace(relative=relative, sight=sight)
+        facts = self._facts(state, place, senses, _restarts(relative) > _restarts(state.relative))
+        mode = next_mode(state.mode, facts, self.cfg.modes)
+        if mode != state.mode:
+            state = self._enter(state, mode, place, senses)
+        if mode == DOCKED:
+            return Command(self._idle.copy(), mode=mode), state
+        steering = self._steer(state, place, senses)
+        return self._act(state, steering, place, senses)
+
+    def _track(self, relative: RelativeState | None, percept: Percept | None, senses: Senses) -> RelativeState | None:
+        """Relative state after this period."""
+        pose = percept.pose if percept is not None and percept.pose is not None and percept.pose.measured else None
+        if relative is None:
+            return self._filter.start(pose, senses) if pose is not None else None
+        relative = self._filter.predict(relative, senses)
+        if pose is not None:
+            relative = self._filter.update_pose(relative, senses, pose)
+        if percept is not None and percept.entrance is not None and self._has_entrance:
+            relative = self._filter.update_bearing(relative, senses, percept.entrance.ray_camera, self._entrance_m)
+        return relative
+
+    def _look(self, sight: Sight | None, percept: Percept | None, senses: Senses) -> Sight | None:
+        """Last far light after this period; None percepts change nothing."""
+        if percept is None:
+            return sight
+        bearing = percept.long_range
+        if bearing is None:
+            return sight._replace(frames=0) if sight is not None and sight.frames else sight
+        azimuth, elevation = self._world_direction(bearing, senses)
+        if not math.isfinite(azimuth + elevation):
+            return sight
+        frames = 1 if sight is None else sight.frames + 1
+        range_m = bearing.range_m if bearing.range_m is not None and math.isfinite(bearing.range_m) else None
+        return Sight(frames, senses.time_s, azimuth, elevation, range_m)
+
+    def _world_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
+        x, y, z = (self._R_body_camera @ bearing.ray_camera).tolist()
+        east, north, up = rotate(rotation_zyx(senses.roll_rad, senses.pitch_rad, senses.yaw_rad), (x, y, z))
+        return math.atan2(north, east), math.atan2(up, math.hypot(east, north))
+
+    def _place(self, relative: RelativeState, senses: Senses) -> Place:
+        heading = senses.yaw_rad - relative.axis_yaw_rad
+        rows = rotation_zyx(senses.roll_rad, senses.pitch_rad, heading)
+        x, y, z = rotate(rows, self._camera_to_nose)
+        px, py, pz = relative.camera_m
+        # Flying in means looking along -x of the station: port is then -y.
+        return Place(
+            distance_m=px + x,
+            port_m=-(py + y),
+            up_m=pz + z,
+            axis_yaw_rad=relative.axis_yaw_rad + math.pi,
+            offset_rad=math.remainder(heading - math.pi, math.tau),
+        )
+
+    def _progress(self, state: PilotState, place: Place | None, now_s: float) -> PilotState:
+        """Note advances along the axis, and since when the vehicle waits at the gate."""
+        if place is None:
+            return state
+        best_m, best_s, gate_s = state.best_m, state.best_s, state.gate_s
+        if place.distance_m < best_m - self.cfg.modes.progress_m:
+            best_m, best_s = place.distance_m, now_s
+        if state.mode != MID or place.distance_m > self.cfg.modes.gate_distance_m + 0.5:
+            gate_s = None
+        elif gate_s is None:
+            gate_s = now_s
+        if best_s == state.best_s and best_m == state.best_m and gate_s == state.gate_s:
+            return state
+        return state._replace(best_m=best_m, best_s=best_s, gate_s=gate_s)
+
+    def _facts(self, state: PilotState, place: Place | None, senses: Senses, jumped: bool) -> Facts:
+        now, relative, sight = senses.time_s, state.relative, state.sight
+        far_away = place is None
+        return Facts(
+            latched=senses.latched,
+            fixes=relative.fixes if relative is not None else 0,
+            since_fix_s=relative.since_fix_s if relative is not None else math.inf,
+            jumped=jumped,
+            distance_m=math.inf if far_away else place.distance_m,
+            off_axis_m=math.inf if far_away else place.off_axis_m,
+            allowed_m=math.inf if far_away else corridor_m(place.distance_m, self.cfg.guidance),
+            heading_error_rad=math.inf if far_away else abs(place.offset_rad - state.offset_rad),
+            sigma_m=relative.cross_track_sigma_m if relative is not None else math.inf,
+            sights=sight.frames if sight is not None else 0,
+            since_sight_s=now - sight.time_s if sight is not None else math.inf,
+            range_m=sight.range_m if sight is not None and now - sight.time_s < 1.0 else None,
+            in_mode_s=now - (state.since_s or 0.0),
+            held_s=now - state.gate_s if state.gate_s is not None else 0.0,
+            stalled_s=now - state.best_s,
+            giving_up=state.giving_up,
+        )
+
+    def _enter(self, state: PilotState, mode: str, place: Place | None, senses: Senses) -> PilotState:
+        """Book-keeping at a change of mode."""
+        attempts, giving_up = state.attempts, state.giving_up
+        if mode == ABORT:
+            giving_up = attempts >= self.cfg.modes.max_attempts
+            attempts = min(attempts + 1, self.cfg.modes.max_attempts)
+        anchor = senses.yaw_rad
+        if mode == ACQUIRE and place is not None:
+            anchor = place.axis_yaw_rad + math.atan2(-place.port_m, max(place.distance_m, 0.1))
+        elif mode == ACQUIRE and state.sight is not None:
+            anchor = state.sight.azimuth_rad
+        turn = math.remainder(anchor - senses.yaw_rad, math.tau)
+        return state._replace(
+            mode=mode,
+            since_s=senses.time_s,
+            attempts=attempts,
+            giving_up=giving_up,
+            integrals=state.integrals if mode in (NEAR, TERMINAL) else (0.0, 0.0),
+            anchor_rad=anchor,
+            anchor_depth_m=senses.depth_m,
+            side=math.copysign(1.0, turn) if turn != 0.0 else state.side,
+            best_m=place.distance_m if place is not None else math.inf,
+            best_s=senses.time_s,
+            gate_s=None,
+        )
+
+    def _steer(self, state: PilotState, place: Place | None, senses: Senses) -> Steering:
+        cfg, mode = self.cfg, state.mode
+        current = state.autopilot.current_m_s or (0.0, 0.0, 0.0)
+        in_mode_s = senses.time_s - (state.since_s or 0.0)
+        if mode == FAR and state.sight is not None:
+            return towards_light(state.sight, self._lamp_height_m, senses, current, self._reach_m_s, cfg.guidance)
+        if mode in (MID, NEAR, TERMINAL) and place is not None and state.relative is not None:
+            blind = state.relative.since_fix_s > 2.0 * cfg.modes.fresh_s
+            at_gate = place.distance_m < cfg.modes.gate_distance_m + 0.3
+            return along_axis(
+                place,
+                state.integrals,
+                mode == MID and (at_gate or (blind and place.distance_m < cfg.modes.commit_distance_m + 1.0)),
+                cfg.guidance.lookahead_mid_m if mode == MID else cfg.guidance.lookahead_near_m,
+                senses,
+                current,
+                self._reach_m_s,
+                cfg.guidance,
+                cfg.modes,
+                self._dt_s,
+            )
+        if mode == ABORT and place is not None:
+            return back_off(place, senses, current, self._reach_m_s, cfg.guidance)
+        hold = search(
+            in_mode_s, state.anchor_rad, state.anchor_depth_m, state.side, place is None, self._pattern, cfg.search
+        )
+        if mode == ABORT:
+            point = hold.setpoint._replace(surge_m_s=-cfg.guidance.back_speed_m_s, heading_rad=state.anchor_rad)
+            return Steering(point)
+        return hold
+
+    def _act(
+        self, state: PilotState, steering: Steering, place: Place | None, senses: Senses
+    ) -> tuple[Command, PilotState]:
+        """Autopilot, allocation, and the log entry."""
+        point = steering.setpoint
+        wrench, loops = self.autopilot.advance(state.autopilot, point, senses)
+        values, achieved = self.allocator.solve(wrench, senses.water_m_s[0])
+        loops = self.autopilot.settle(loops, wrench, achieved)
+        log = {
+            "surge_m_s": point.surge_m_s,
+            "sway_m_s": point.sway_m_s,
+            "heave_m_s": point.heave_m_s,
+            "pitch_rad": point.pitch_rad,
+            "heading_rad": math.remainder(point.heading_rad, math.tau),
+        }
+        if point.depth_m is not None:
+            log["depth_m"] = point.depth_m
+        if place is not None:
+            log["distance_m"], log["port_m"], log["up_m"] = place.distance_m, place.port_m, place.up_m
+        state = state._replace(
+            autopilot=loops,
+            integrals=(steering.port_integral, steering.up_integral),
+            offset_rad=steering.offset_rad,
+        )
+        return Command(values, mode=state.mode, setpoint=log, giving_up=state.giving_up), state
+
+
+def _restarts(relative: RelativeState | None) -> int:
+    return relative.restarts if relative is not None else 0

@@ -1,0 +1,265 @@
+"""What each mode asks of the autopilot: from where the vehicle is to a set-point."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+from auvdock.controllers.autopilot import AutopilotSetpoint
+from auvdock.controllers.guidance import GuidanceCfg, approach_speed, crab_angle, ilos
+from auvdock.controllers.modes import ModeCfg
+from auvdock.controllers.senses import Senses, Vector
+from auvdock.core.errors import ConfigError
+
+__all__ = [
+    "Place",
+    "SearchCfg",
+    "Sight",
+    "Steering",
+    "along_axis",
+    "back_off",
+    "search",
+    "search_pattern",
+    "towards_light",
+]
+
+
+@dataclass(frozen=True)
+class SearchCfg:
+    """The look around while no light is seen."""
+
+    turn_rate_rad_s: float = 0.35
+    """Rate of the sweep in heading."""
+    settle_s: float = 1.5
+    """Wait before the first turn."""
+    amplitudes_rad: tuple[float, ...] = (0.7, 1.4)
+    """The sweep widens to these headings on either side."""
+    advance_m: float = 5.0
+    """Way ahead between two sweeps, if the place before the station is unknown."""
+    advance_speed_m_s: float = 0.5
+    """Speed on that way."""
+    depth_step_m: float = 1.0
+    """Every second sweep runs so much deeper, every fourth so much higher."""
+
+    def __post_init__(self) -> None:
+        """Rates and widths are positive."""
+        if not self.turn_rate_rad_s > 0.0:
+            raise ConfigError("control.search.turn_rate_rad_s", self.turn_rate_rad_s, "a rate above 0 rad/s")
+        if not self.advance_speed_m_s > 0.0:
+            raise ConfigError("control.search.advance_speed_m_s", self.advance_speed_m_s, "a speed above 0 m/s")
+        if not self.amplitudes_rad or min(self.amplitudes_rad) <= 0.0:
+            raise ConfigError("control.search.amplitudes_rad", self.amplitudes_rad, "one or more angles above 0 rad")
+
+
+class Sight(NamedTuple):
+    """Last seen light of the far stage.
+
+    Attributes:
+        frames: frames in a row with it.
+        time_s: when it was last seen.
+        azimuth_rad: world direction to it, positive to port.
+        elevation_rad: positive up.
+        range_m: rough range, None if unknown.
+    """
+
+    frames: int
+    time_s: float
+    azimuth_rad: float
+    elevation_rad: float
+    range_m: float | None
+
+
+class Place(NamedTuple):
+    """The nose before the mouth in approach axes (forward into the funnel, port, up).
+
+    Attributes:
+        distance_m: before the mouth; negative inside.
+        port_m: to port of the axis.
+        up_m: above the axis.
+        axis_yaw_rad: compass heading of a vehicle that flies straight in.
+        offset_rad: heading relative to that, positive to port.
+    """
+
+    distance_m: float
+    port_m: float
+    up_m: float
+    axis_yaw_rad: float
+    offset_rad: float
+
+    @property
+    def off_axis_m(self) -> float:
+        """Distance from the axis."""
+        return math.hypot(self.port_m, self.up_m)
+
+
+class Steering(NamedTuple):
+    """A set-point with what guidance remembers.
+
+    Attributes:
+        setpoint: for the autopilot.
+        port_integral, up_integral: of the integral line of sight.
+        offset_rad: wanted heading relative to the axis.
+    """
+
+    setpoint: AutopilotSetpoint
+    port_integral: float = 0.0
+    up_integral: float = 0.0
+    offset_rad: float = 0.0
+
+
+def search_pattern(cfg: SearchCfg) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Times in s and heading offsets in rad of the widening sweep's corners; it starts and ends at 0."""
+    corners = [0.0]
+    for amplitude in cfg.amplitudes_rad:
+        corners += [amplitude, -amplitude]
+    corners.append(0.0)
+    times = [cfg.settle_s]
+    for before, after in pairwise(corners):
+        times.append(times[-1] + abs(after - before) / cfg.turn_rate_rad_s)
+    return tuple(times), tuple(corners)
+
+
+def search(
+    in_mode_s: float,
+    heading_rad: float,
+    depth_m: float,
+    side: float,
+    advance: bool,
+    pattern: tuple[tuple[float, ...], tuple[float, ...]],
+    cfg: SearchCfg,
+) -> Steering:
+    """Sweep the heading about `heading_rad`, holding place over ground; then go ahead and sweep again.
+
+    Args:
+        in_mode_s: time since the search began.
+        heading_rad: centre of the sweep.
+        depth_m: depth about which the search runs.
+        side: +1 turns to port first, -1 to starboard.
+        advance: whether to go ahead between sweeps.
+        pattern: from `search_pattern`.
+        cfg: the search.
+    """
+    times, corners = pattern
+    ahead_s = cfg.advance_m / cfg.advance_speed_m_s if advance else 0.0
+    cycle, moment = divmod(in_mode_s, times[-1] + ahead_s)
+    depth = depth_m + cfg.depth_step_m * (0.0, 1.0, 0.0, -1.0)[int(cycle) % 4]
+    offset, speed = 0.0, 0.0
+    if moment >= times[-1]:
+        speed = cfg.advance_speed_m_s
+    elif moment > times[0]:
+        leg = bisect_right(times, moment) - 1
+        part = (moment - times[leg]) / (times[leg + 1] - times[leg])
+        offset = corners[leg] + part * (corners[leg + 1] - corners[leg])
+    return Steering(AutopilotSetpoint(speed, 0.0, 0.0, 0.0, heading_rad + side * offset, depth))
+
+
+def towards_light(
+    sight: Sight,
+    lamp_height_m: float,
+    senses: Senses,
+    current_m_s: Vector,
+    reach_m_s: float,
+    cfg: GuidanceCfg,
+) -> Steering:
+    """Pure pursuit of a bearing: course along its azimuth over ground, height by its elevation.
+
+    A lone lamp hangs `lamp_height_m` above the axis, so at range R the wanted elevation is atan(h/R); R is the rough
+    range if known, else `assumed_range_m`. A group whose range is known is the array about the axis itself.
+    """
+    known = sight.range_m is not None
+    wanted = 0.0 if known else math.atan2(lamp_height_m, cfg.assumed_range_m)
+    turn = math.remainder(sight.azimuth_rad - senses.yaw_rad, math.tau)
+    speed = cfg.far_speed_m_s * min(1.0, max(0.0, 1.6 - 1.5 * abs(turn)))
+    if sight.range_m is not None:
+        speed = min(speed, max(0.15, 0.12 * (sight.range_m - 2.0)))
+    climb = max(speed, 0.3) * math.tan(min(0.7, max(-0.7, sight.elevation_rad - wanted)))
+    climb = _clip(climb, cfg.max_vertical_speed_m_s)
+    setpoint, offset = _ground_course(
+        speed, 0.0, climb, sight.azimuth_rad, 0.0, cfg.max_crab_rad, senses, current_m_s, reach_m_s
+    )
+    return Steering(setpoint, offset_rad=offset)
+
+
+def along_axis(
+    place: Place,
+    integrals: tuple[float, float],
+    hold: bool,
+    lookahead_m: float,
+    senses: Senses,
+    current_m_s: Vector,
+    reach_m_s: float,
+    guidance: GuidanceCfg,
+    modes: ModeCfg,
+    dt_s: float,
+) -> Steering:
+    """Along the approach axis: integral line of sight sideways and vertically, hull aligned but for crab.
+
+    Cross-track speeds are U sin χ with χ from `guidance.ilos`; the forward speed is `guidance.approach_speed`, 0 while
+    `hold`. Crab fades from `max_crab_rad` at the standoff to `max_entry_crab_rad` at the mouth.
+    """
+    port_angle, port_integral = ilos(place.port_m, integrals[0], lookahead_m, guidance.integral_gain, dt_s)
+    up_angle, up_integral = ilos(place.up_m, integrals[1], lookahead_m, guidance.integral_gain, dt_s)
+    if place.distance_m < 0.0:  # the funnel guides now: what its walls do must not wind up the integrals
+        port_integral, up_integral = integrals
+    bound = guidance.max_cross_speed_m_s
+    port = _clip(guidance.cross_speed_m_s * math.sin(port_angle), bound)
+    up = _clip(guidance.cross_speed_m_s * math.sin(up_angle), bound)
+    forward = approach_speed(place.distance_m, place.off_axis_m, guidance)
+    if place.distance_m < modes.mouth_m:
+        forward = guidance.entry_speed_m_s
+    elif hold:
+        forward = _clip(0.3 * (place.distance_m - modes.gate_distance_m), 0.2)
+    blend = min(1.0, max(0.0, place.distance_m / modes.standoff_m))
+    limit = guidance.max_entry_crab_rad + blend * max(0.0, guidance.max_crab_rad - guidance.max_entry_crab_rad)
+    look = 0.0
+    if place.distance_m > 1.0:
+        bearing = math.atan2(-place.port_m, place.distance_m)
+        look = bearing - _clip(bearing, guidance.max_view_angle_rad)
+    setpoint, offset = _ground_course(
+        forward, port, up, place.axis_yaw_rad, look, limit, senses, current_m_s, reach_m_s
+    )
+    return Steering(setpoint, port_integral, up_integral, offset)
+
+
+def back_off(place: Place, senses: Senses, current_m_s: Vector, reach_m_s: float, cfg: GuidanceCfg) -> Steering:
+    """Backwards along the axis with the hull aligned; inside the funnel straight back."""
+    port = up = 0.0
+    if place.distance_m > 0.0:
+        port = _clip(-0.25 * place.port_m, cfg.max_cross_speed_m_s)
+        up = _clip(-0.25 * place.up_m, cfg.max_cross_speed_m_s)
+    setpoint, offset = _ground_course(
+        -cfg.back_speed_m_s, port, up, place.axis_yaw_rad, 0.0, 0.0, senses, current_m_s, reach_m_s
+    )
+    return Steering(setpoint, offset_rad=offset)
+
+
+def _ground_course(
+    forward_m_s: float,
+    port_m_s: float,
+    up_m_s: float,
+    course_rad: float,
+    look_rad: float,
+    crab_limit_rad: float,
+    senses: Senses,
+    current_m_s: Vector,
+    reach_m_s: float,
+) -> tuple[AutopilotSetpoint, float]:
+    """Set-point for a velocity over ground given along and across a world direction, and the heading offset in it."""
+    cosine, sine = math.cos(course_rad), math.sin(course_rad)
+    along = current_m_s[0] * cosine + current_m_s[1] * sine
+    across = -current_m_s[0] * sine + current_m_s[1] * cosine
+    offset = look_rad
+    if crab_limit_rad > 0.0:
+        offset += crab_angle(forward_m_s - along, port_m_s - across, reach_m_s, crab_limit_rad)
+    turn = math.remainder(senses.yaw_rad - course_rad, math.tau)
+    cosine, sine = math.cos(turn), math.sin(turn)
+    surge = forward_m_s * cosine + port_m_s * sine
+    sway = port_m_s * cosine - forward_m_s * sine
+    return AutopilotSetpoint(surge, sway, up_m_s, 0.0, course_rad + offset), offset
+
+
+def _clip(value: float, bound: float) -> float:
+    return bound if value > bound else -bound if value < -bound else value
