@@ -95,7 +95,8 @@ class Autopilot:
     """PI on body velocities, PID on pitch and heading, P on depth, with the hull's drag fed forward.
 
     τ = PID(error) + ff, where ff balances drag, lift and Munk moment at the reference velocity through the water
-    (reference over ground minus measured current) and the net buoyancy. Derivatives are the measured rates.
+    (reference over ground minus measured current), the net buoyancy, and the inertia along the shaped reference.
+    Derivatives are the measured rates.
     """
 
     def __init__(self, vehicle: VehicleCfg, cfg: AutopilotCfg, dt_s: float) -> None:
@@ -132,6 +133,7 @@ class Autopilot:
             or vehicle.quadratic_damping_body[row, column] != 0.0
             or vehicle.lift_damping_body[row, column] != 0.0
         ]
+        self._mass = tuple(np.diag(vehicle.rigid_body_mass_body + vehicle.added_mass_body)[:3].tolist())
         added = vehicle.added_mass_body
         self._added_mass = tuple(float(added[row, column]) for row in range(3) for column in range(3))
 
@@ -170,6 +172,15 @@ class Autopilot:
             drift = rotate_back(world, current)
             through_water = (wanted[0] - drift[0], wanted[1] - drift[1], wanted[2] - drift[2])
         feed = self._balance(through_water)
+        before = state.references_m_s
+        push = rotate_back(
+            level,
+            (
+                self._mass[0] * (references[0] - before[0]) / dt_s,
+                self._mass[1] * (references[1] - before[1]) / dt_s,
+                self._mass[2] * (references[2] - before[2]) / dt_s,
+            ),
+        )
         lift = rotate_back(level, (0.0, 0.0, self._net_weight_n))
 
         bound = cfg.max_heading_error_rad
@@ -184,7 +195,13 @@ class Autopilot:
             heading_error,
         )
         rates = (0.0, 0.0, 0.0, q, r)
-        feeds = (feed[0] + lift[0], feed[1] + lift[1], feed[2] + lift[2], feed[4], feed[5])
+        feeds = (
+            feed[0] + lift[0] + push[0],
+            feed[1] + lift[1] + push[1],
+            feed[2] + lift[2] + push[2],
+            feed[4],
+            feed[5],
+        )
         outputs: list[float] = []
         integrals: list[float] = []
         for axis in range(5):

@@ -307,7 +307,7 @@ class ConicalPilot:
             return towards_light(state.sight, self._lamp_height_m, senses, current, self._reach_m_s, cfg.guidance)
         if mode in (MID, NEAR, TERMINAL) and place is not None and state.relative is not None:
             blind = state.relative.since_fix_s > 2.0 * cfg.modes.fresh_s
-            at_gate = place.distance_m < cfg.modes.gate_distance_m + 0.3
+            at_gate = place.distance_m < cfg.modes.gate_distance_m
             return along_axis(
                 place,
                 state.integrals,

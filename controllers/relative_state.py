@@ -39,6 +39,8 @@ class FilterCfg:
     """Standard deviation of the direction to the entrance lamps."""
     entrance_spread_m: float = 0.05
     """Uncertainty of the entrance lamps' centre, as some of them may be hidden."""
+    min_bearing_range_m: float = 0.6
+    """Nearer than this to the entrance lamps, some of them leave the image and their centre misleads."""
     gate: float = 22.5
     """Greatest squared Mahalanobis distance of an accepted pose: 99.9 % of χ² with 6 degrees of freedom."""
     bearing_gate: float = 13.8
@@ -211,7 +213,7 @@ class RelativeFilter:
         covariance, camera, yaw = state.covariance, state.camera_m, state.axis_yaw_rad
         to_target = (target_m[0] - camera[0], target_m[1] - camera[1], target_m[2] - camera[2])
         dx, dy, dz = rotate_back((c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]), to_target)
-        if dz < 0.3:
+        if dz < cfg.min_bearing_range_m:
             return state
         variance = cfg.bearing_floor_rad**2 + (cfg.entrance_spread_m / dz) ** 2
         tx, ty, tz = -to_target[1], to_target[0], 0.0  # e_z × (target − p)

@@ -202,7 +202,8 @@ def along_axis(
     """
     port_angle, port_integral = ilos(place.port_m, integrals[0], lookahead_m, guidance.integral_gain, dt_s)
     up_angle, up_integral = ilos(place.up_m, integrals[1], lookahead_m, guidance.integral_gain, dt_s)
-    if place.distance_m < 0.0:  # the funnel guides now: what its walls do must not wind up the integrals
+    # Integral action is for what is left on the axis: not for the way there, nor for what the funnel's walls do.
+    if place.distance_m < 0.0 or place.off_axis_m > guidance.corridor_m:
         port_integral, up_integral = integrals
     bound = guidance.max_cross_speed_m_s
     port = _clip(guidance.cross_speed_m_s * math.sin(port_angle), bound)
