@@ -130,9 +130,9 @@ class HungarianRansacAssociation:
             reprojectionError=self._cfg.ransac_px / float(self._camera.matrix[0, 0]),
             flags=cv2.SOLVEPNP_P3P,
         )
-        if not ok or inliers is None or len(inliers) < 4:
+        if not ok or len(inliers) < 4:
             return None
-        kept = np.sort(np.asarray(inliers).ravel())
+        kept = np.sort(np.asarray(inliers, dtype=np.int64).ravel())
         sigma = np.full(len(kept), self._sigma_px)
         solution = self._solver.plain(points[kept], pixels[kept], sigma, prior)
         if solution is None or not math.isfinite(solution.cost):

@@ -55,13 +55,12 @@ class LineOfSight:
     def __init__(self, cfg: LineOfSightCfg, camera: Camera, layout: BeaconLayout) -> None:
         """Precompute the layout's spreads."""
         self._cfg = cfg
-        self._undistort = _Undistorter(camera)
+        self._map = _PixelMap(camera)
         blue = layout.indices("array") + layout.indices("long_range")
         self._blue_spread_m = _spread(layout.positions_m[list(blue)])
         red = layout.indices("entrance")
         self._red_spread_m = _spread(layout.positions_m[list(red)]) if len(red) > 1 else 0.0
         self._centre_m = layout.array_positions_m.mean(axis=0)
-        self._camera = camera
         self.reset()
 
     def reset(self) -> None:
@@ -70,7 +69,7 @@ class LineOfSight:
 
     def update(self, tracks: LightTracker, solution: PnpSolution | None) -> tuple[Bearing | None, Bearing | None]:
         """(long range, entrance) bearings of this frame; with a pose the first is that of the array's centre."""
-        lights = self._steady(tracks)
+        lights = self._steady(tracks, (RED,) if solution is not None else (BLUE, RED))
         red = lights[RED]
         entrance = self._group(red, self._red_spread_m) if red else None
         if solution is not None:
@@ -80,25 +79,23 @@ class LineOfSight:
             return self._group(blue, self._blue_spread_m), entrance
         return (self._single(blue) if blue else None), entrance
 
-    def _steady(self, tracks: LightTracker) -> dict[int, list[_Light]]:
+    def _steady(self, tracks: LightTracker, classes: tuple[int, ...]) -> dict[int, list[_Light]]:
         found: dict[int, list[_Light]] = {BLUE: [], RED: []}
-        if len(tracks) == 0:
+        rows = [
+            row
+            for row, (class_id, hits, missed) in enumerate(
+                zip(tracks.class_id.tolist(), tracks.hits.tolist(), tracks.missed.tolist(), strict=True)
+            )
+            if class_id in classes and hits >= self._cfg.min_occurrences and missed <= self._cfg.max_missed
+        ]
+        if not rows:
             return found
         window = tracks.history.shape[1]
-        counts = tracks.occurrences().tolist()
-        sums = tracks.history.sum(axis=1).tolist()
-        rows = zip(
-            tracks.class_id.tolist(),
-            counts,
-            tracks.missed.tolist(),
-            tracks.state.tolist(),
-            sums,
-            tracks.track_id.tolist(),
-            strict=True,
-        )
-        for class_id, count, missed, state, total, track_id in rows:
-            if class_id in found and count >= self._cfg.min_occurrences and missed <= self._cfg.max_missed:
-                found[class_id].append(_Light(state[0], state[1], total / window, track_id))
+        for row in rows:
+            scores = tracks.history[row].tolist()
+            if window - scores.count(0.0) >= self._cfg.min_occurrences:
+                u, v = tracks.state[row, :2].tolist()
+                found[int(tracks.class_id[row])].append(_Light(u, v, sum(scores) / window, int(tracks.track_id[row])))
         return found
 
     def _single(self, lights: list[_Light]) -> Bearing:
@@ -121,29 +118,37 @@ class LineOfSight:
         if n >= 3 and spread_m > 0.0:
             square = sum((light.u - u) ** 2 + (light.v - v) ** 2 for light in kept) / n
             if square > 1.0:
-                range_m = spread_m * self._undistort.focal_px / math.sqrt(square)
+                range_m = spread_m * self._map.focal_px / math.sqrt(square)
         return self._bearing(u, v, score, range_m)
 
     def _array_centre(self, solution: PnpSolution) -> Bearing:
         centre = solution.rotation @ self._centre_m + solution.translation_m
         range_m = math.sqrt(float(centre @ centre))
-        pixel = self._camera.project(centre[None])[0]
-        return Bearing(centre / range_m, pixel, 1.0, range_m)
+        x, y, z = centre.tolist()
+        return Bearing(centre / range_m, self._map.pixel(x / z, y / z), 1.0, range_m)
 
     def _bearing(self, u: float, v: float, score: float, range_m: float | None) -> Bearing:
-        x, y = self._undistort(u, v)
+        x, y = self._map(u, v)
         scale = 1.0 / math.sqrt(1.0 + x * x + y * y)
         return Bearing(np.array([x * scale, y * scale, scale]), np.array([u, v]), min(score, 1.0), range_m)
 
 
-class _Undistorter:
-    """One pixel at a time, in plain floats: a tenth of the cost of the array version."""
+class _PixelMap:
+    """The camera's projection for one pixel at a time, in plain floats: a tenth of the cost of the array version."""
 
     def __init__(self, camera: Camera) -> None:
         self.focal_px = float(camera.matrix[0, 0])
         self._fx, self._fy = float(camera.matrix[0, 0]), float(camera.matrix[1, 1])
         self._cx, self._cy = float(camera.matrix[0, 2]), float(camera.matrix[1, 2])
         self._k = tuple(camera.distortion.tolist())
+
+    def pixel(self, x: float, y: float) -> Array:
+        k1, k2, p1, p2, k3 = self._k
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        u = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        v = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        return np.array([u * self._fx + self._cx, v * self._fy + self._cy])
 
     def __call__(self, u: float, v: float) -> tuple[float, float]:
         k1, k2, p1, p2, k3 = self._k

@@ -1,19 +1,22 @@
 """Pose from authenticated beacons: solver by count, Levenberg–Marquardt refinement, covariance, reprojection error.
 
-Paper A, section 4.3. With n ≥ 5 lights SQPnP (Terzakis & Lourakis 2020, "fast PnP based on quadratic programming"), with
-3 or 4 the iterative solver; both end in Levenberg–Marquardt on the reprojection error in pixels, lens distortion
-included. Lights of a plane have two poses that reproject almost equally well (Schweighofer & Pinz 2006): the vehicle's
-own attitude decides between them.
+Paper A, section 4.3. With n ≥ 5 lights SQPnP (Terzakis & Lourakis 2020; our reading of the paper's "fast PnP ...
+quadratic programming"), with 3 or 4 the iterative solver; both end in Levenberg–Marquardt on the reprojection error in
+pixels, lens distortion included. A frame that follows on a solved one starts that refinement from the last pose. Lights
+of a plane have two poses that reproject almost equally well (Schweighofer & Pinz 2006): the vehicle's own attitude
+decides between them.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
+from numpy.typing import NDArray
+from scipy.linalg import get_lapack_funcs
 
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
@@ -21,8 +24,10 @@ from auvdock.core.errors import ConfigError
 
 __all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "translation_from_rotation"]
 
+_potrf, _potrs = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 _MAX_ITERATIONS = 20
-_STEP_TOLERANCE = 1e-5
+_DECREMENT = 1e-6
+_IDENTITY = np.eye(6)
 
 
 @dataclass(frozen=True)
@@ -74,7 +79,8 @@ class PnpSolution:
 
     def T_station_camera(self) -> Array:
         """(4, 4) pose of the camera in the station frame: [Rᵀ, -Rᵀ t]."""
-        transform = np.eye(4)
+        transform = np.zeros((4, 4))
+        transform[3, 3] = 1.0
         transform[:3, :3] = self.rotation.T
         transform[:3, 3] = -self.rotation.T @ self.translation_m
         return transform
@@ -85,8 +91,6 @@ class PnpSolution:
         With Σ = (JᵀWJ)⁻¹ over (r, t), δ = J_l(r) dr a small rotation of the camera axes: d(position) =
         -Rᵀ (dt + t × δ), and the camera turns by -δ.
         """
-        inverse, _ = dpotri(self.normal, lower=1)
-        inverse = inverse + np.tril(inverse, -1).T
         left = _left_jacobian(self.rotation_vector)
         x, y, z = self.translation_m.tolist()
         skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -94,7 +98,9 @@ class PnpSolution:
         to[:3, :3] = -self.rotation.T @ skew @ left
         to[:3, 3:] = -self.rotation.T
         to[3:, :3] = -left
-        return to @ inverse @ to.T
+        half, _ = _potrs(self.normal, to.T, lower=1)
+        covariance = to @ half
+        return 0.5 * (covariance + covariance.T)
 
 
 class PnpSolver:
@@ -156,7 +162,7 @@ class PnpSolver:
             return None
         if not ok:
             return None
-        start = (np.asarray(rotation).ravel(), np.asarray(translation).ravel())
+        start = (_vector(rotation), _vector(translation))
         return self._refine(start, points_m, pixels, sigma_px, rotation_prior, "plain")
 
     def project(self, solution: PnpSolution, points_m: Array) -> Array:
@@ -174,14 +180,14 @@ class PnpSolver:
         ok, rotation, translation = cv2.solvePnP(points, xy, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
         if not ok:
             return None
-        start = (np.asarray(rotation).ravel(), np.asarray(translation).ravel())
+        start = (_vector(rotation), _vector(translation))
         return self._refine(start, points, pixels, sigma, prior, "sqpnp")
 
     def _from_prior(self, points: Array, pixels: Array, sigma: Array, prior: Array) -> PnpSolution | None:
         translation = translation_from_rotation(prior, points, self._camera.normalise(pixels))
         if translation is None:
             return None
-        return self._refine((cv2.Rodrigues(prior)[0].ravel(), translation), points, pixels, sigma, prior, "iterative")
+        return self._refine((_rodrigues(prior).ravel(), translation), points, pixels, sigma, prior, "iterative")
 
     def _refine(
         self,
@@ -199,48 +205,43 @@ class PnpSolver:
             pose = np.concatenate(start)
         weight = np.repeat(1.0 / sigma, 2)
         target = np.ascontiguousarray(pixels).reshape(-1)
-        prior_vector, prior_matrix = self._prior_terms(prior)
-        damping, cost = 0.0, math.inf
-        normal, gradient, residual = np.eye(6), np.zeros(6), target
-        trial, converged = pose, False
+        prior_vector, prior_matrix = self._prior_terms(prior) if self._prior_weight else (np.zeros(3), np.zeros((3, 3)))
+        damping, cost, trial = 0.0, math.inf, pose
+        normal, gradient, residual, offset = _IDENTITY, np.zeros(6), target, np.zeros(3)
         for _ in range(_MAX_ITERATIONS):
             image, jacobian = cv2.projectPoints(points, trial[:3], trial[3:], self._matrix, self._distortion)
             difference = image.reshape(-1) - target
             weighted = weight * difference
             trial_cost = float(weighted @ weighted)
-            offset = trial[:3] - prior_vector
             if self._prior_weight:
+                offset = trial[:3] - prior_vector
                 trial_cost += float(offset @ prior_matrix @ offset)
             if not math.isfinite(trial_cost):
                 return None
-            if trial_cost <= cost * (1.0 + 1e-12):
+            if trial_cost <= cost:
                 pose, cost, residual, damping = trial, trial_cost, difference, damping * 0.1
                 scaled = weight[:, None] * jacobian[:, :6]
                 normal, gradient = scaled.T @ scaled, scaled.T @ weighted
                 if self._prior_weight:
                     normal[:3, :3] += prior_matrix
                     gradient[:3] += prior_matrix @ offset
-                if converged:
-                    break
-            elif converged:
-                break
             else:
                 damping = max(10.0 * damping, 1e-3)
-            damped = normal
-            if damping > 1e-9:
-                damped = normal.copy()
-                damped[np.diag_indices(6)] *= 1.0 + damping
-            factor, info = dpotrf(damped, lower=1)
+            damped = normal + np.diag(damping * normal.diagonal()) if damping > 1e-9 else normal
+            factor, info = _potrf(damped, lower=1)
             if info:
                 damping = max(10.0 * damping, 1e-3)
                 continue
-            step, _ = dpotrs(factor, gradient, lower=1)
+            step, _ = _potrs(factor, gradient, lower=1)
             trial = pose - step
-            converged = float(np.abs(step).max()) < _STEP_TOLERANCE * max(1.0, abs(float(pose[5])))
-        factor, info = dpotrf(normal, lower=1)
+            # The expected fall of χ²: below this the step is a thousandth of the pose's standard deviation.
+            if float(gradient @ step) < _DECREMENT and damping <= 1e-9:
+                pose = trial
+                break
+        factor, info = _potrf(normal, lower=1)
         if info or pose[5] <= 0.0:
             return None
-        rotation = cv2.Rodrigues(pose[:3])[0]
+        rotation = _rodrigues(pose[:3])
         cosine = (float(np.vdot(rotation, prior)) - 1.0) / 2.0
         return PnpSolution(
             rotation_vector=pose[:3],
@@ -254,9 +255,7 @@ class PnpSolver:
         )
 
     def _prior_terms(self, prior: Array) -> tuple[Array, Array]:
-        if not self._prior_weight:
-            return np.zeros(3), np.zeros((3, 3))
-        vector = cv2.Rodrigues(prior)[0].ravel()
+        vector = _rodrigues(prior).ravel()
         left = _left_jacobian(vector)
         return vector, self._prior_weight * (left.T @ left)
 
@@ -278,6 +277,14 @@ def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Ar
     if depth <= 0.0:
         return None
     return np.array([*(mean_e + mean_xy * depth), depth])
+
+
+def _rodrigues(rotation: Array) -> Array:
+    return np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64)
+
+
+def _vector(column: NDArray[Any]) -> Array:
+    return np.asarray(column, dtype=np.float64).ravel()
 
 
 def _left_jacobian(vector: Array) -> Array:

@@ -156,6 +156,7 @@ class SpatiotemporalAssociation:
             settled = self._settle(pixels, identity, prior)
             if settled is not None:
                 found = np.flatnonzero(settled >= 0)
+                tracks.beacon_id[:] = -1
                 tracks.beacon_id[chosen[settled[found]]] = found
                 return True
         return False

@@ -73,8 +73,8 @@ def light_class(image: Image, left: int, top: int, right: int, bottom: int) -> i
 def crop_of(region: RegionOfInterest, height: int, width: int) -> tuple[int, int, int, int]:
     """(left, top, right, bottom) of the part of the image that decides about a region.
 
-    A margin as wide as the background's window is added and the grid of the background is kept, so that a light is found
-    at the same place with and without regions.
+    A margin as wide as the background's window is added and the grid of the background is kept, so that a light is
+    found at the same place with and without regions.
     """
     left = max((region.x0 - _MARGIN_PX) // CELL_PX * CELL_PX, 0)
     top = max((region.y0 - _MARGIN_PX) // CELL_PX * CELL_PX, 0)

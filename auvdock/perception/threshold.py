@@ -1,8 +1,8 @@
 """The threshold detector: brightness above background, connected components, centroids (paper A's baseline a).
 
-The published baseline binarises globally. Haze and halo make that useless in turbid water, so the threshold here stands
-on an estimate of background and noise; and since neighbouring lights grow together at a low level, each component is cut
-again at higher levels until it stops falling apart.
+The published baseline binarises globally. Haze and halo make that useless in turbid water, so the threshold here
+stands on an estimate of background and noise; and since neighbouring lights grow together at a low level, each
+component is cut again at higher levels until it stops falling apart.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class TrackerCfg:
     """σ_a, standard deviation of a light's acceleration in the image."""
     initial_speed_px_s: float = 120.0
     """Standard deviation of a new track's unknown velocity."""
-    gate_sigmas: float = 4.0
+    gate_sigmas: float = 5.0
     """A detection farther than this from the prediction is another light."""
     max_predicted_frames: int = 10
     """A confirmed track outlives this many frames without a detection and dies at the next (paper A: 10)."""
