@@ -41,7 +41,7 @@ class Latch:
         self.entry: Entry | None = None
         self.closed_at_s: float | None = None
         self.docked = False
-        self._last_x_m = math.inf
+        self._last_x_m = -math.inf
 
     def update(
         self, time_s: float, nose_m: tuple[float, float, float], inward_speed_m_s: float, angle_rad: float
@@ -65,8 +65,7 @@ class Latch:
         if last_x > self._throat_x_m:
             self.entry = Entry(inward_speed_m_s, angle_rad, y, z)
         if (
-            self.entry is not None
-            and x <= self._close_x_m
+            x <= self._close_x_m
             and angle_rad <= self._max_angle_rad
             and abs(inward_speed_m_s) <= self._cfg.max_speed_m_s
         ):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 
 from auvdock.core.arrays import Array
@@ -13,6 +12,7 @@ from auvdock.core.station import ConicalStationCfg
 from auvdock.core.transforms import quat_wxyz_from_rotation
 from auvdock.core.vehicle import MountCfg, VehicleCfg
 from auvdock.sim.hydrodynamics import GRAVITY_M_S2
+from auvdock.sim.mj import MjModel, mujoco
 from auvdock.sim.station_geometry import station_geoms
 
 __all__ = ["LATCH", "VEHICLE", "build_model", "scene_xml"]
@@ -30,7 +30,7 @@ _FIN_SPAN_M = 0.055
 _FIN_CHORD_M = 0.075
 
 
-def build_model(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) -> mujoco.MjModel:
+def build_model(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) -> MjModel:
     """Compile the scene, with the contact solver told the vehicle's mass in water.
 
     MuJoCo scales a contact's softness by `body_invweight0`, taken from the dry mass; it is replaced by the same mean

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from auvdock.core.arrays import Array, check_shape
@@ -18,19 +17,19 @@ from auvdock.core.station import ConicalStationCfg
 from auvdock.core.transforms import euler_zyx_from_rotation, make_transform
 from auvdock.core.vehicle import VehicleCfg, load_vehicle
 from auvdock.sim.actuation import Actuators
+from auvdock.sim.contacts import Contacts
 from auvdock.sim.hydrodynamics import Hydrodynamics
 from auvdock.sim.latch import Latch
+from auvdock.sim.mj import MjData, mujoco
 from auvdock.sim.ocean import CurrentCfg, Ocean
 from auvdock.sim.scene import LATCH, VEHICLE, build_model
 from auvdock.sim.sensors import SensorCfg, Sensors
+from auvdock.sim.state import is_absurd, rotation_rows
 from auvdock.sim.truth import Truth
 
 __all__ = ["HistoryEntry", "SimCfg", "Simulator"]
 
 _HISTORY_STEPS = 240
-_MAX_SPEED_M_S = 10.0
-_MAX_RATE_RAD_S = 50.0
-_MAX_DISTANCE_M = 200.0
 
 
 @dataclass(frozen=True)
@@ -101,10 +100,10 @@ class Simulator:
         self._ocean = Ocean(cfg.current, station.depth_m, self._dt_s)
         self._sensors = Sensors(cfg.sensors)
         self._latch = Latch(station.latch, station.funnel)
-        self._hull = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, "hull")
-        self._floor = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, "floor")
+        self._contacts = Contacts(self.model, self._data, self.vehicle.nose_x_m, self.vehicle.radius_m)
         self._weld = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_EQUALITY, LATCH)
         self._body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
+        self._truth: Truth | None = None
         self._bind()
         self.reset(np.array([10.0, 0.0, -station.depth_m]), np.array([0.0, 0.0, 0.0, 1.0]), np.random.default_rng(0))
 
@@ -115,11 +114,11 @@ class Simulator:
         self._mass = data.M[:21]
         self._xmat = data.xmat[self._body].reshape(3, 3)
         self._applied = data.qfrc_applied
-        self._constraint_force = data.qfrc_constraint[:3]
+        self._contacts.bind(data)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the views."""
-        views = ("_qpos", "_qvel", "_mass", "_xmat", "_applied", "_constraint_force")
+        views = ("_qpos", "_qvel", "_mass", "_xmat", "_applied")
         return {key: value for key, value in self.__dict__.items() if key not in views}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -128,7 +127,7 @@ class Simulator:
         self._bind()
 
     @property
-    def data(self) -> mujoco.MjData:
+    def data(self) -> MjData:
         """MuJoCo's data, with poses of bodies, geoms, cameras and lights brought up to the present state."""
         if self._poses_stale:
             mujoco.mj_kinematics(self.model, self._data)
@@ -171,7 +170,7 @@ class Simulator:
         self._qvel[:3] = self._ocean.velocity(float(position_world_m[2]))
         self._steps = 0
         self._diverged = False
-        self._contact_force_n = self._peak_contact_force_n = 0.0
+        self._contacts.reset()
         self._energy_j = self._path_length_m = 0.0
         self.history.clear()
         mujoco.mj_forward(self.model, self._data)
@@ -193,8 +192,8 @@ class Simulator:
         qpos: list[float] = self._qpos.tolist()
         qvel: list[float] = self._qvel.tolist()
         self.history.append(HistoryEntry(self.time_s, qpos, qvel, list(command)))
-        if _is_absurd(qpos, qvel):
-            self._diverged = True
+        if is_absurd(qpos, qvel):
+            self._observe()
             return
         mujoco.mj_step1(model, data)
         rotation = self._xmat
@@ -214,7 +213,7 @@ class Simulator:
         self._steps += 1
         self._energy_j += self._actuators.power_w(advance) * self._dt_s
         self._path_length_m += math.sqrt(qvel[0] ** 2 + qvel[1] ** 2 + qvel[2] ** 2) * self._dt_s
-        self._note_contact()
+        self._contacts.update()
         self._observe()
 
     @property
@@ -224,20 +223,25 @@ class Simulator:
 
     @property
     def truth(self) -> Truth:
-        """A snapshot of the true state."""
+        """A snapshot of the true state; its arrays are read-only, since callers between two steps share it."""
+        if self._truth is not None:
+            return self._truth
         rotation, nu, nu_relative, water = self._motion()
         entry = self._latch.entry
-        return Truth(
+        pose, nose = make_transform(rotation, self._qpos[:3]), np.array(self._nose_m)
+        for array in (pose, nose, nu, nu_relative, water):
+            array.flags.writeable = False
+        self._truth = Truth(
             time_s=self.time_s,
-            T_world_body=make_transform(rotation, self._qpos[:3]),
+            T_world_body=pose,
             nu_body=nu,
             nu_relative_body=nu_relative,
             current_world_m_s=water,
-            nose_station_m=np.array(self._nose_m),
+            nose_station_m=nose,
             axis_angle_rad=self._axis_angle_rad,
-            contact_force_n=self._contact_force_n,
-            peak_contact_force_n=self._peak_contact_force_n,
-            touching_station=self._touches_station(),
+            contact_force_n=self._contacts.force_n,
+            peak_contact_force_n=self._contacts.peak_force_n,
+            touching_station=self._contacts.touching_station,
             latched=self._latch.closed_at_s is not None,
             docked=self._latch.docked,
             entry_speed_m_s=entry.speed_m_s if entry else None,
@@ -248,6 +252,7 @@ class Simulator:
             path_length_m=self._path_length_m,
             diverged=self._diverged,
         )
+        return self._truth
 
     def proprioception(self) -> Proprioception:
         """One noisy sample of the vehicle's own sensors; draws from the sensors' generator."""
@@ -258,14 +263,14 @@ class Simulator:
             euler_zyx_rad=euler_zyx_from_rotation(rotation),
             nu_body=nu,
             nu_relative_body=nu_relative,
-            bow_force_n=self._contact_force_n if self._nose_touches() else 0.0,
+            bow_force_n=self._contacts.bow_force_n(self._qpos[:3], rotation[:, 0]),
             latched=self._latch.closed_at_s is not None,
         )
 
     def _motion(self) -> tuple[Array, Array, Array, Array]:
         """Rotation body to world, ν over ground, ν relative to the water, water's velocity."""
         w, x, y, z = self._qpos[3:7].tolist()
-        rotation = np.array(_rotation(w, x, y, z)).reshape(3, 3)
+        rotation = np.array(rotation_rows(w, x, y, z)).reshape(3, 3)
         water = np.array(self._ocean.velocity(float(self._qpos[2])))
         nu = np.concatenate([self._qvel[:3] @ rotation, self._qvel[3:6]])
         nu_relative = np.concatenate([(self._qvel[:3] - water) @ rotation, self._qvel[3:6]])
@@ -273,13 +278,14 @@ class Simulator:
 
     def _observe(self) -> None:
         """Nose, latch and divergence after a step or a reset."""
+        self._truth = None
         qpos: list[float] = self._qpos.tolist()
         qvel: list[float] = self._qvel.tolist()
-        if _is_absurd(qpos, qvel):
+        if is_absurd(qpos, qvel):
             self._diverged = True
             self._nose_m, self._axis_angle_rad = (math.nan, math.nan, math.nan), math.nan
             return
-        r00, r01, r02, r10, _, _, r20, _, _ = _rotation(*qpos[3:7])
+        r00, r01, r02, r10, _, _, r20, _, _ = rotation_rows(*qpos[3:7])
         reach = self.vehicle.nose_x_m
         nose = qpos[0] + reach * r00, qpos[1] + reach * r10, qpos[2] + reach * r20 + self.station.depth_m
         # The tube points along −x of the station frame, which is not turned against the world.
@@ -300,64 +306,3 @@ class Simulator:
         weld[6:10] = w, -qx, -qy, -qz
         weld[10] = 1.0
         self._data.eq_active[self._weld] = 1
-
-    def _note_contact(self) -> None:
-        """Net contact force of the step just taken; the latch's hold is no contact."""
-        data = self._data
-        if data.ncon == 0:
-            self._contact_force_n = 0.0
-            return
-        if self._latch.closed_at_s is None:
-            x, y, z = self._constraint_force.tolist()
-            force = math.sqrt(x * x + y * y + z * z)
-        else:
-            total, one = np.zeros(3), np.zeros(6)
-            for index in range(data.ncon):
-                mujoco.mj_contactForce(self.model, data, index, one)
-                sign = 1.0 if int(data.contact.geom[index, 1]) == self._hull else -1.0
-                total += sign * (one[:3] @ data.contact.frame[index].reshape(3, 3))
-            force = math.sqrt(float(total @ total))
-        self._contact_force_n = force
-        self._peak_contact_force_n = max(self._peak_contact_force_n, force)
-
-    def _touches_station(self) -> bool:
-        data = self._data
-        if data.ncon == 0 or self._contact_force_n == 0.0:
-            return False
-        return bool(np.any(np.all(data.contact.geom != self._floor, axis=1) & (data.contact.dist < 0.0)))
-
-    def _nose_touches(self) -> bool:
-        """Whether a contact lies on the rounded nose."""
-        if self._data.ncon == 0 or self._contact_force_n == 0.0:
-            return False
-        offset = self._data.contact.pos - self._qpos[:3]
-        w, x, y, z = self._qpos[3:7].tolist()
-        r = _rotation(w, x, y, z)
-        return bool(np.any(offset @ np.array([r[0], r[3], r[6]]) > self.vehicle.nose_x_m - self.vehicle.radius_m))
-
-
-def _is_absurd(qpos: list[float], qvel: list[float]) -> bool:
-    """True unless all is finite, slow and near; written so that a NaN answers True."""
-    x, y, z, qw, qx, qy, qz = qpos
-    u, v, w, p, q, r = qvel
-    return not (
-        x * x + y * y + z * z < _MAX_DISTANCE_M**2
-        and u * u + v * v + w * w < _MAX_SPEED_M_S**2
-        and p * p + q * q + r * r < _MAX_RATE_RAD_S**2
-        and 0.5 < qw * qw + qx * qx + qy * qy + qz * qz < 2.0
-    )
-
-
-def _rotation(w: float, x: float, y: float, z: float) -> tuple[float, ...]:
-    """Rotation of a unit quaternion, row by row."""
-    return (
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - w * z),
-        2 * (x * z + w * y),
-        2 * (x * y + w * z),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - w * x),
-        2 * (x * z - w * y),
-        2 * (y * z + w * x),
-        1 - 2 * (x * x + y * y),
-    )

@@ -21,7 +21,7 @@ class Truth:
         current_world_m_s: (3,) velocity of the water at the vehicle.
         nose_station_m: (3,) tip of the nose in the station frame.
         axis_angle_rad: angle between the hull's axis and the tube's, 0 when pointing straight in.
-        contact_force_n: magnitude of the net contact force in the last step (its mean over the step).
+        contact_force_n: magnitude of the net force of contacts and latch on the hull, mean over the last step.
         peak_contact_force_n: the greatest so far.
         touching_station: True while any part of the hull touches the station.
         latched: True once the latch has closed.
