@@ -11,6 +11,8 @@ from auvdock.core.errors import AuvdockError, ConfigError
 __all__ = ["view"]
 
 _MAGIC = b"RRF"
+_LAUNCH = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
+"""`python -m rerun_cli` would lose the viewer's exit code."""
 
 
 def view(path: Path) -> None:
@@ -30,9 +32,11 @@ def view(path: Path) -> None:
     if magic != _MAGIC:
         raise ConfigError("path", str(path), "a recording in Rerun's format, as --record writes it")
     # The viewer listens for further recordings; on the loopback address only, not to the whole network.
-    command = [sys.executable, "-m", "rerun_cli", "--bind", "127.0.0.1", str(path.resolve())]
+    command = [sys.executable, "-c", _LAUNCH, "--bind", "127.0.0.1", str(path.resolve())]
     try:
-        finished = subprocess.run(command, stderr=subprocess.PIPE, text=True, errors="replace", check=False)
+        finished = subprocess.run(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace", check=False
+        )
     except OSError as error:
         raise AuvdockError(f"Rerun's viewer cannot be started: {error}") from error
     if finished.returncode != 0:
