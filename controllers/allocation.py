@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,36 +34,34 @@ class ThrustAllocator:
     """Solves min cᵀ W c subject to B(u) c = τ with |c| ≤ 1 (Fossen 2011, section 12.3.2; Durham 1993 for the limits).
 
     B(u) has a thruster's wrench at command 1 in its column, or a fin's times u |u|. Roll, or any other axis on which
-    no thruster acts, is left alone. Actuators that share an axis form a group (lateral, vertical, axial); a group
+    no thruster acts, is left alone. Actuators that share an axis form a group (axial, lateral, vertical); a group
     whose wrench is out of reach gives the longest reachable wrench in the same direction, and the other groups are
     not touched.
     """
 
     def __init__(self, vehicle: VehicleCfg, cfg: AllocationCfg | None = None) -> None:
-        """Precompute what does not depend on speed.
+        """Sort the actuators into groups.
 
         Args:
             vehicle: whose actuators.
             cfg: sharing between thrusters and fins.
         """
         cfg = cfg or AllocationCfg()
-        fins = np.array([actuator.kind == "fin" for actuator in vehicle.actuators])
+        fins = [actuator.kind == "fin" for actuator in vehicle.actuators]
         self._full = vehicle.thruster_wrenches_body.copy()
-        reach = np.abs(self._full[:, ~fins]).sum(axis=1)
-        self._rows = [row for row in range(6) if reach[row] > _TINY]
-        self._columns = self._full[self._rows]
-        self._fins = np.flatnonzero(fins)
-        self._fin_mask = fins.astype(np.float64)
-        self._thruster_mask = 1.0 - self._fin_mask
-        self._inverse_weight = np.where(fins, 1.0 / cfg.fin_weight, 1.0)
+        self._is_fin = np.array(fins)
+        reach = np.abs(self._full[:, ~self._is_fin]).sum(axis=1)
+        rows = [row for row in range(6) if reach[row] > _TINY]
+        inverse_weight = [1.0 / cfg.fin_weight if fin else 1.0 for fin in fins]
+        self._groups = [
+            _Group(self._full, group_rows, columns, fins, inverse_weight)
+            for group_rows, columns in _components(self._full, rows)
+        ]
         self._dead_band = [actuator.dead_band for actuator in vehicle.actuators]
-        self._groups = _groups(self._columns)
-        thrusters = self._columns[:, ~fins]
-        self._full_rank = bool(np.linalg.matrix_rank(thrusters) == len(self._rows))
 
     def effectiveness(self, surge_m_s: float) -> Array:
         """(6, n) B(u): wrench per command at forward speed `surge_m_s` through the water, body axes."""
-        return self._full * (self._thruster_mask + self._fin_mask * (surge_m_s * abs(surge_m_s)))
+        return self._full * np.where(self._is_fin, surge_m_s * abs(surge_m_s), 1.0)
 
     def allocate(self, wrench_body: Array, surge_m_s: float) -> Array:
         """Commands (n,) in [-1, 1] for a wrench (6,) in N and N m, body axes.
@@ -74,76 +74,162 @@ class ThrustAllocator:
             Commands with the thrusters' dead band compensated: a command inside the dead band would give nothing, so
             it becomes 0 or the band's edge, whichever is nearer.
         """
-        check_shape("wrench_body", wrench_body, (6,))
         return self.solve(wrench_body, surge_m_s)[0]
 
     def solve(self, wrench_body: Array, surge_m_s: float) -> tuple[Array, Array]:
         """As `allocate`, with the wrench (6,) that the commands give, dead band apart: what anti-windup needs."""
-        scale = self._thruster_mask + self._fin_mask * (surge_m_s * abs(surge_m_s))
-        effect = self._columns * scale
-        weighted = effect * self._inverse_weight
-        wanted = wrench_body[self._rows]
-        gram = weighted @ effect.T
-        multiplier = np.linalg.solve(gram, wanted) if self._full_rank else np.linalg.pinv(gram) @ wanted
-        command = multiplier @ weighted
-        values: list[float] = command.tolist()
-        if max(values) > 1.0 or min(values) < -1.0:
-            for rows, columns in self._groups:
-                if any(abs(values[column]) > 1.0 for column in columns):
-                    part = _longest(effect[np.ix_(rows, columns)], command[columns])
-                    for column, value in zip(columns, part, strict=True):
-                        values[column] = value
-        achieved = np.zeros(6)
-        achieved[self._rows] = effect @ np.array(values)
-        for index, band in enumerate(self._dead_band):
-            value = values[index]
-            if 0.0 < abs(value) < band:
-                edge = band if value > 0.0 else -band
-                values[index] = edge if abs(value) > 0.5 * band else 0.0
-        return np.array(values), achieved
+        check_shape("wrench_body", wrench_body, (6,))
+        wanted: list[float] = wrench_body.tolist()
+        achieved = [0.0] * 6
+        values = [0.0] * len(self._dead_band)
+        effect = surge_m_s * abs(surge_m_s)
+        for group in self._groups:
+            commands = group.solve(wanted, effect)
+            group.add_wrench(achieved, commands, effect)
+            for column, value in zip(group.columns, commands, strict=True):
+                band = self._dead_band[column]
+                if -band < value < band:
+                    value = 0.0 if abs(value) <= 0.5 * band else math.copysign(band, value)
+                values[column] = value
+        return np.array(values), np.array(achieved)
 
 
-def _groups(columns: Array) -> list[tuple[list[int], list[int]]]:
+class _Group:
+    """Actuators that share axes with each other and with no others."""
+
+    def __init__(
+        self,
+        full: Array,
+        rows: list[int],
+        columns: list[int],
+        fins: list[bool],
+        inverse_weight: list[float],
+    ) -> None:
+        self.rows, self.columns = rows, columns
+        self._fins = [fins[column] for column in columns]
+        self._inverse_weight = [inverse_weight[column] for column in columns]
+        self._effect: list[list[float]] = full[np.ix_(rows, columns)].tolist()
+        # With at most two axes the closed form needs B W⁻¹ Bᵀ = G_thrusters + (u |u|)² G_fins, symmetric 2 × 2.
+        self._planar = len(rows) <= 2
+        pairs = zip(self._effect[0], self._effect[1] if len(rows) > 1 else [0.0] * len(columns), strict=True)
+        self._columns = [
+            (p, q, weight, fin) for (p, q), weight, fin in zip(pairs, self._inverse_weight, self._fins, strict=True)
+        ]
+        thrusters, moving = _gram(self._columns, fins=False), _gram(self._columns, fins=True)
+        if len(rows) == 1:  # a second axis that nothing acts on and that nothing is asked of
+            thrusters = (thrusters[0], 0.0, 1.0)
+        self._grams = (thrusters, moving)
+
+    def solve(self, wrench: Sequence[float], fin_effect: float) -> list[float]:
+        """Commands for the group's part of the wrench, or for the longest part of it within reach."""
+        commands = self._least(wrench, fin_effect)
+        if max(commands) <= 1.0 and min(commands) >= -1.0:
+            return commands
+        return _longest(commands, _null_vector(self._scaled(fin_effect)))
+
+    def add_wrench(self, wrench: list[float], commands: list[float], fin_effect: float) -> None:
+        """Add the wrench of the commands."""
+        rows = self.rows
+        if self._planar:
+            x = y = 0.0
+            for command, (p, q, _, fin) in zip(commands, self._columns, strict=True):
+                share = command * fin_effect if fin else command
+                x += p * share
+                y += q * share
+            wrench[rows[0]] += x
+            wrench[rows[-1]] += y  # with one axis y is 0
+            return
+        for row, line in zip(rows, self._scaled(fin_effect), strict=True):
+            wrench[row] += sum(value * command for value, command in zip(line, commands, strict=True))
+
+    def _scaled(self, fin_effect: float) -> list[list[float]]:
+        """Rows of B at this speed."""
+        return [
+            [value * fin_effect if fin else value for value, fin in zip(line, self._fins, strict=True)]
+            for line in self._effect
+        ]
+
+    def _least(self, wrench: Sequence[float], fin_effect: float) -> list[float]:
+        """Commands W⁻¹ Bᵀ (B W⁻¹ Bᵀ)⁻¹ τ, in closed form for one and two axes."""
+        if self._planar:
+            (a, b, d), (fa, fb, fd) = self._grams
+            square = fin_effect * fin_effect
+            a, b, d = a + square * fa, b + square * fb, d + square * fd
+            determinant = a * d - b * b
+            if determinant > _TINY * a * d:
+                x, y = wrench[self.rows[0]], wrench[self.rows[-1]]
+                m, n = (d * x - b * y) / determinant, (a * y - b * x) / determinant
+                return [weight * (p * m + q * n) * (fin_effect if fin else 1.0) for p, q, weight, fin in self._columns]
+        matrix = np.array(self._scaled(fin_effect))
+        weighted = matrix * np.array(self._inverse_weight)
+        wanted = np.array([wrench[row] for row in self.rows])
+        commands: list[float] = (weighted.T @ (np.linalg.pinv(weighted @ matrix.T) @ wanted)).tolist()
+        return commands
+
+
+def _gram(columns: Sequence[tuple[float, float, float, bool]], fins: bool) -> tuple[float, float, float]:
+    """Upper triangle of B W⁻¹ Bᵀ over the fins, or over the thrusters, of a planar group."""
+    a = b = d = 0.0
+    for p, q, weight, fin in columns:
+        if fin is fins:
+            a, b, d = a + weight * p * p, b + weight * p * q, d + weight * q * q
+    return a, b, d
+
+
+def _components(full: Array, rows: list[int]) -> list[tuple[list[int], list[int]]]:
     """Connected components of the bipartite graph of wrench rows and actuators."""
-    touches = np.abs(columns) > _TINY
+    touches = np.abs(full) > _TINY
     groups: list[tuple[list[int], list[int]]] = []
-    remaining = set(range(columns.shape[0]))
+    remaining = set(rows)
     while remaining:
-        rows = {min(remaining)}
+        part = {min(remaining)}
         while True:
-            members = {int(column) for column in np.flatnonzero(touches[sorted(rows)].any(axis=0))}
-            grown = {int(row) for row in np.flatnonzero(touches[:, sorted(members)].any(axis=1))}
-            if grown <= rows:
+            members = [int(column) for column in np.flatnonzero(touches[sorted(part)].any(axis=0))]
+            grown = {int(row) for row in np.flatnonzero(touches[:, members].any(axis=1))} & remaining
+            if grown <= part:
                 break
-            rows |= grown
-        groups.append((sorted(rows), sorted(members)))
-        remaining -= rows
+            part |= grown
+        groups.append((sorted(part), members))
+        remaining -= part
     return groups
 
 
-def _longest(effect: Array, command: Array) -> list[float]:
-    """Commands c with |c| ≤ 1 and B c = λ B command, λ ≤ 1 as great as it goes.
+def _null_vector(effect: list[list[float]]) -> list[float] | None:
+    """The commands that give no wrench, if there is one redundant actuator, else None."""
+    count = len(effect[0])
+    if len(effect) == 2 and count == 3:
+        (a, b, c), (x, y, z) = effect
+        null = [b * z - c * y, c * x - a * z, a * y - b * x]
+        size = math.sqrt(null[0] * null[0] + null[1] * null[1] + null[2] * null[2])
+        return [part / size for part in null] if size > _TINY else None
+    _, singular, rows = np.linalg.svd(np.array(effect))
+    rank = int(np.sum(singular > _TINY * singular[0]))
+    return rows[-1].tolist() if count - rank == 1 else None
+
+
+def _longest(commands: list[float], null: list[float] | None) -> list[float]:
+    """Commands with |c| ≤ 1 that give λ times the wrench, λ ≤ 1 as great as it goes.
 
     With one redundant actuator all solutions are λ a + t n, n spanning the null space: a linear programme in (λ, t),
-    solved pair by pair of limits. With more redundancy the commands are scaled down, which may fall short of the
-    greatest λ.
+    solved pair by pair of limits. Otherwise the commands are scaled down, which with more redundancy may fall short of
+    the greatest λ.
     """
-    _, singular, rows = np.linalg.svd(effect)
-    rank = int(np.sum(singular > _TINY * singular[0]))
-    a: list[float] = command.tolist()
-    if effect.shape[1] - rank != 1:
-        biggest = max(abs(value) for value in a)
-        return [value / biggest for value in a]
-    null: list[float] = rows[-1].tolist()
-    fixed = [abs(value) for value, part in zip(a, null, strict=True) if abs(part) <= _TINY]
-    reach = 1.0 / max(1.0, *fixed) if fixed else 1.0
-    lines = [(1.0 / abs(part), value / part) for value, part in zip(a, null, strict=True) if abs(part) > _TINY]
+    if null is None:
+        reach = 1.0 / max(abs(value) for value in commands)
+        return [min(1.0, max(-1.0, reach * value)) for value in commands]
+    reach = 1.0
+    lines: list[tuple[float, float]] = []
+    for value, part in zip(commands, null, strict=True):
+        if abs(part) > _TINY:
+            lines.append((1.0 / abs(part), value / part))
+        else:
+            reach = min(reach, 1.0 / max(abs(value), 1.0))
     # Each moving command bounds t: -w - λ s <= t <= w - λ s with w = 1/|n|, s = a/n.
     for width_i, slope_i in lines:
         for width_j, slope_j in lines:
-            if slope_j > slope_i:
-                reach = min(reach, (width_i + width_j) / (slope_j - slope_i))
+            if (slope_j - slope_i) * reach > width_i + width_j:
+                reach = (width_i + width_j) / (slope_j - slope_i)
     low = max(-width - reach * slope for width, slope in lines)
     high = min(width - reach * slope for width, slope in lines)
     shift = min(max(0.0, low), high)
-    return [min(1.0, max(-1.0, reach * value + shift * part)) for value, part in zip(a, null, strict=True)]
+    return [min(1.0, max(-1.0, reach * value + shift * part)) for value, part in zip(commands, null, strict=True)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from auvdock.controllers.gains import AutopilotGains, DesignCfg, design_gains
 from auvdock.controllers.pid import pid_step
-from auvdock.controllers.senses import Rows, Senses, Vector, cross, read_senses, rotate, rotate_back, rotation_zyx
+from auvdock.controllers.senses import Rows, Senses, Vector, cross, read_senses, rotate, rotate_back, turn
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import ConfigError
@@ -152,7 +152,7 @@ class Autopilot:
     ) -> tuple[Array, AutopilotState]:
         """As `step`, from unpacked senses."""
         cfg, dt_s = self._cfg, self._dt_s
-        world = rotation_zyx(senses.roll_rad, senses.pitch_rad, senses.yaw_rad)
+        world = turn(senses.level, senses.yaw_rad)
         current = self._current(state.current_m_s, senses, world)
         measured = senses.water_m_s if setpoint.through_water else senses.ground_m_s
 
@@ -165,7 +165,7 @@ class Autopilot:
             _slew(state.references_m_s[2], heave, cfg.sway_acceleration_m_s2 * dt_s),
         )
         # Level heading frame to body: the same rotation without its yaw.
-        level = rotation_zyx(senses.roll_rad, senses.pitch_rad, 0.0)
+        level = senses.level
         wanted = rotate_back(level, references)
         through_water = wanted
         if not setpoint.through_water:

@@ -24,7 +24,7 @@ from auvdock.controllers.modes import (
     next_mode,
 )
 from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
-from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rotation_zyx
+from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, turn
 from auvdock.controllers.steering import (
     Place,
     SearchCfg,
@@ -219,13 +219,12 @@ class ConicalPilot:
 
     def _world_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
         x, y, z = (self._R_body_camera @ bearing.ray_camera).tolist()
-        east, north, up = rotate(rotation_zyx(senses.roll_rad, senses.pitch_rad, senses.yaw_rad), (x, y, z))
+        east, north, up = rotate(turn(senses.level, senses.yaw_rad), (x, y, z))
         return math.atan2(north, east), math.atan2(up, math.hypot(east, north))
 
     def _place(self, relative: RelativeState, senses: Senses) -> Place:
         heading = senses.yaw_rad - relative.axis_yaw_rad
-        rows = rotation_zyx(senses.roll_rad, senses.pitch_rad, heading)
-        x, y, z = rotate(rows, self._camera_to_nose)
+        x, y, z = rotate(turn(senses.level, heading), self._camera_to_nose)
         px, py, pz = relative.camera_m
         # Flying in means looking along -x of the station: port is then -y.
         return Place(

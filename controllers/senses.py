@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from auvdock.core.contracts import Proprioception
 
-__all__ = ["Rows", "Senses", "Vector", "cross", "read_senses", "rotate", "rotate_back", "rotation_zyx"]
+__all__ = ["Rows", "Senses", "Vector", "cross", "read_senses", "rotate", "rotate_back", "rotation_zyx", "turn"]
 
 Vector = tuple[float, float, float]
 Rows = tuple[float, float, float, float, float, float, float, float, float]
@@ -26,6 +26,7 @@ class Senses(NamedTuple):
         water_m_s: velocity through the water, body axes.
         contact: bow switch.
         latched: latch reported closed.
+        level: rotation from body axes to the level heading frame (ahead, port, up).
     """
 
     time_s: float
@@ -38,6 +39,7 @@ class Senses(NamedTuple):
     water_m_s: Vector
     contact: bool
     latched: bool
+    level: Rows
 
 
 def read_senses(proprioception: Proprioception) -> Senses:
@@ -55,6 +57,7 @@ def read_senses(proprioception: Proprioception) -> Senses:
         water_m_s=_finite(proprioception.velocity_water_m_s.tolist()),
         contact=proprioception.contact,
         latched=proprioception.latched,
+        level=rotation_zyx(roll, pitch, 0.0),
     )
 
 
@@ -81,6 +84,23 @@ def rotation_zyx(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Rows:
         -sp,
         cp * sr,
         cp * cr,
+    )
+
+
+def turn(level: Rows, yaw_rad: float) -> Rows:
+    """Rz(yaw) R: from a level heading frame to one that is turned by −yaw against it."""
+    a, b, c, d, e, f, g, h, i = level
+    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
+    return (
+        cosine * a - sine * d,
+        cosine * b - sine * e,
+        cosine * c - sine * f,
+        sine * a + cosine * d,
+        sine * b + cosine * e,
+        sine * c + cosine * f,
+        g,
+        h,
+        i,
     )
 
 
