@@ -51,7 +51,6 @@ class LightSet:
         layout: BeaconLayout,
         water: WaterCfg,
         extra: Sequence[BeaconCfg] = (),
-        path_loss: Sequence[float] = (),
     ) -> None:
         """Precompute what does not depend on the pose.
 
@@ -59,7 +58,6 @@ class LightSet:
             layout: the station's beacons; they come first.
             water: the water between lamps and camera.
             extra: further lamps, in the station frame.
-            path_loss: for each of `extra` a factor on its light, such as a reflectance.
         """
         lamps = (*layout.beacons, *extra)
         self.count = len(lamps)
@@ -67,9 +65,8 @@ class LightSet:
         self.positions_m = np.array([lamp.position_m for lamp in lamps], dtype=np.float64)
         axes = np.array([lamp.axis for lamp in lamps], dtype=np.float64)
         self.axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
-        loss = np.concatenate([np.ones(self.station_count), np.asarray(path_loss, dtype=np.float64)])
-        self.peak_w_sr = np.array([peak_intensity_w_sr(lamp) for lamp in lamps]) * loss
-        self.flux_w = np.array([lamp.power_w * lamp.efficiency for lamp in lamps]) * loss
+        self.peak_w_sr = np.array([peak_intensity_w_sr(lamp) for lamp in lamps])
+        self.flux_w = np.array([lamp.power_w * lamp.efficiency for lamp in lamps])
         half = np.radians([lamp.beam_angle_deg for lamp in lamps]) / 2.0
         self._minus_profile = -math.log(2.0) / half**2
         self.absorption_per_m = np.array([water.absorption_at(lamp.wavelength_nm) for lamp in lamps])
@@ -81,7 +78,7 @@ class LightSet:
         self._rim_radius2 = float(np.max(np.sum((array[:, 1:] - self._rim_centre) ** 2, axis=1)))
         setback = self._rim_x - self.positions_m[:, 0]
         inside = np.sum((self.positions_m[:, 1:] - self._rim_centre) ** 2, axis=1) < self._rim_radius2
-        self._recessed = np.flatnonzero((setback > 0.05) & inside)
+        self._recessed = np.flatnonzero(((setback > 0.05) & inside)[: self.station_count])
         self._setback = setback[self._recessed]
         self._recessed_yz = self.positions_m[self._recessed, 1:] - self._rim_centre
 

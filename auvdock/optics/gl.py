@@ -1,0 +1,143 @@
+"""Offscreen OpenGL through MuJoCo's own renderer: colour and metric depth of the static scene in one pass."""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from auvdock.core.arrays import Array, Image
+from auvdock.core.errors import GraphicsError
+from auvdock.sim.mj import MjModel, mujoco
+
+__all__ = ["StaticRenderer"]
+
+_NEAR_M, _FAR_M = 0.05, 80.0
+_REMEDY = (
+    "install libegl1 and libgl1-mesa-dri and set MUJOCO_GL=egl, or install libosmesa6 and set MUJOCO_GL=osmesa; "
+    "or run without images: --fidelity beacons"
+)
+
+
+class StaticRenderer:
+    """Draws what does not move: geoms fixed to the world, under one light from above.
+
+    The vehicle itself is not drawn, so a camera may sit inside its hull. No context is made before the first `render`;
+    after a fork or unpickling a new one is made in the new process.
+    """
+
+    def __init__(self, model: MjModel, width_px: int, height_px: int, tangent_x: float, tangent_y: float) -> None:
+        """Keep the view: half width and half height of the image as tangents of angles."""
+        self._model = model
+        self._size = (width_px, height_px)
+        self._tangents = (tangent_x, tangent_y)
+        self._process = -1
+        self._gl: Any = None
+        self._drop()
+
+    def _drop(self) -> None:
+        self._gl, self._context, self._scene, self._data = None, None, None, None
+        self._process = -1
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but OpenGL's state, which lives in one process."""
+        return {"model": self._model, "size": self._size, "tangents": self._tangents}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A renderer without a context."""
+        self.__init__(state["model"], *state["size"], *state["tangents"])
+
+    def close(self) -> None:
+        """Free the context, if this process has one."""
+        if self._process == os.getpid():
+            self._gl.make_current()
+            self._context.free()
+            self._gl.free()
+        self._drop()
+
+    def render(self, T_world_camera: Array) -> tuple[Image, NDArray[np.float32]]:
+        """Shaded albedo (h, w, 3) uint8 and depth along the optical axis (h, w) in metres; rows from the bottom up.
+
+        Depth is `inf` where there is nothing.
+
+        Raises:
+            GraphicsError: no OpenGL context can be had here; the message says what to install.
+        """
+        if self._process != os.getpid():
+            self._drop()
+            self._open()
+        self._gl.make_current()
+        width, height = self._size
+        scene = self._scene
+        for camera in scene.camera:
+            camera.pos[:] = T_world_camera[:3, 3]
+            camera.forward[:] = T_world_camera[:3, 2]
+            camera.up[:] = -T_world_camera[:3, 1]
+            camera.frustum_near, camera.frustum_far = _NEAR_M, _FAR_M
+            camera.frustum_top, camera.frustum_bottom = self._tangents[1] * _NEAR_M, -self._tangents[1] * _NEAR_M
+            camera.frustum_center, camera.frustum_width = 0.0, self._tangents[0] * _NEAR_M
+        rect = mujoco.MjrRect(0, 0, width, height)
+        mujoco.mjr_render(rect, scene, self._context)
+        colour = np.empty((height, width, 3), dtype=np.uint8)
+        depth = np.empty((height, width), dtype=np.float32)
+        mujoco.mjr_readPixels(colour, depth, rect, self._context)
+        # Reversed depth: 1 at the near plane, 0 at the far plane.
+        empty = depth <= 0.0
+        depth *= np.float32(_FAR_M - _NEAR_M)
+        depth += np.float32(_NEAR_M)
+        np.divide(np.float32(_NEAR_M * _FAR_M), depth, out=depth)
+        depth[empty] = np.inf
+        return colour, depth
+
+    def _open(self) -> None:
+        width, height = self._size
+        model = self._model
+        quality = model.vis.quality
+        kept = quality.offsamples, quality.shadowsize
+        try:
+            self._gl = _gl_context(width, height)
+            self._gl.make_current()
+            quality.offsamples, quality.shadowsize = 0, 0
+            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+            mujoco.mjr_resizeOffscreen(width, height, self._context)
+            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        except Exception as error:
+            self._drop()
+            raise GraphicsError(f"no OpenGL context for rendering ({error}); {_REMEDY}") from error
+        finally:
+            quality.offsamples, quality.shadowsize = kept
+        self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        scene = mujoco.MjvScene(model, 2 * model.ngeom + 100)
+        for flag in ("SHADOW", "REFLECTION", "SKYBOX", "FOG", "HAZE"):
+            scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
+        static = mujoco.mjtCatBit.mjCAT_STATIC
+        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), static, scene)
+        scene.nlight = 1
+        light = scene.lights[0]
+        light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        light.headlight, light.castshadow = 0, 0
+        light.pos[:], light.dir[:] = (0.0, 0.0, 10.0), (0.0, 0.0, -1.0)
+        light.ambient[:], light.diffuse[:], light.specular[:] = 0.5, 0.5, 0.0
+        self._scene, self._data = scene, data
+        self._process = os.getpid()
+
+
+def _gl_context(width: int, height: int) -> Any:  # noqa: ANN401
+    """MuJoCo's own choice of context; without MUJOCO_GL and without a display, EGL and then OSMesa."""
+    try:
+        return mujoco.GLContext(width, height)
+    except Exception:
+        if os.environ.get("MUJOCO_GL"):
+            raise
+    failure: Exception | None = None
+    for name in ("egl", "osmesa"):
+        try:
+            return import_module(f"mujoco.{name}").GLContext(width, height)
+        except Exception as error:
+            failure = error
+    raise RuntimeError(str(failure))

@@ -1,0 +1,146 @@
+"""The camera under water: from a pose to a frame."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from auvdock.core.arrays import Array
+from auvdock.core.beacons import BeaconLayout
+from auvdock.core.camera import Camera
+from auvdock.core.contracts import Frame
+from auvdock.optics.bands import BANDS_NM, electrons_per_joule
+from auvdock.optics.exposure import AutoExposure
+from auvdock.optics.lights_image import LightsImage, add_spot
+from auvdock.optics.metering import predicted_share
+from auvdock.optics.nuisance import NuisanceCfg
+from auvdock.optics.scene import LitScene, View
+from auvdock.optics.sensor import Sensor, saturated_share
+from auvdock.optics.settings import ExposureCfg, ImagingCfg
+from auvdock.optics.surfaces import Surfaces
+from auvdock.optics.water import WaterCfg
+
+__all__ = ["ExposureCfg", "HasModel", "ImagingCfg", "UnderwaterCamera"]
+
+
+class HasModel(Protocol):
+    """Whoever owns a MuJoCo model: the simulator."""
+
+    @property
+    def model(self) -> Any:  # noqa: ANN401
+        """The `mujoco.MjModel` whose static geoms are drawn."""
+        ...
+
+
+class UnderwaterCamera:
+    """Renders lamps, halos, surfaces and nuisances to 8 bits.
+
+    Auto-exposure reacts to the frames taken before; `reset` forgets them.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        water: WaterCfg,
+        layout: BeaconLayout,
+        nuisance: NuisanceCfg,
+        cfg: ImagingCfg,
+        T_world_station: Array,
+        scene: HasModel | None = None,
+    ) -> None:
+        """Precompute tables; no OpenGL context is made before a frame needs one.
+
+        Args:
+            camera: intrinsics, distortion and mounting.
+            water: what lies between.
+            layout: the station's beacons.
+            nuisance: what makes the scene hard.
+            cfg: the camera as an instrument.
+            T_world_station: (4, 4) pose of the station frame.
+            scene: owner of the MuJoCo model whose static geoms are drawn; without it only lights are.
+        """
+        self.lit = LitScene(camera, water, layout, nuisance, cfg, T_world_station)
+        self.exposure = AutoExposure(cfg.exposure)
+        self._cfg, self._camera, self._water = cfg, camera, water
+        self._sensor = Sensor(camera.width_px, camera.height_px, cfg)
+        self._surfaces = Surfaces(self.lit, scene.model) if scene is not None and cfg.surfaces else None
+        per_joule = np.array([electrons_per_joule(nm) for nm in BANDS_NM])
+        self._band_electrons = (per_joule * self.lit.lens.aperture_m2).T
+        solid = self.lit.lens.solid_angle_sr.astype(np.float32)
+        self._solid_angle = solid[:, :, None]
+        self._buffer = np.empty((camera.height_px, camera.width_px, 3), dtype=np.float32)
+        self.reset(np.random.default_rng(0))
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Start an episode: new noise, new nuisances, exposure from scratch."""
+        self.lit.reset(rng)
+        self._lights = LightsImage(self.lit.lens, self.lit.lights, self._water, self.lit.spots)
+        self._sensor.reset(self.lit.sensor_rng)
+        self.exposure.reset()
+
+    def close(self) -> None:
+        """Free OpenGL's context, if one was made."""
+        if self._surfaces is not None:
+            self._surfaces.close()
+
+    def capture(self, T_world_body: Array, time_s: float) -> Frame:
+        """Take a frame from a body pose (4, 4).
+
+        Raises:
+            GraphicsError: surfaces are to be seen and no OpenGL context can be had.
+        """
+        view = self.lit.look(T_world_body, time_s)
+        if not self.exposure.settled:
+            self.exposure.settle(predicted_share(self.lit, view))
+        exposure_s, gain = self.exposure.exposure_s, self.exposure.gain
+        electrons = self.electrons(view, exposure_s, gain)
+        image = self._sensor.expose(electrons, gain)
+        self.exposure.update(saturated_share(image))
+        return Frame(image, time_s, self._camera)
+
+    def electrons(self, view: View, exposure_s: float, gain: float = 1.0) -> NDArray[np.float32]:
+        """Mean photo-electrons (H, W, 3), red, green, blue, without noise; valid until the next call."""
+        lens = self.lit.lens
+        received = view.received
+        lit = np.flatnonzero((received.halo_w_m2 + received.core_w_m2 > 0.0) & (received.ray_camera[:, 2] > 0.0))
+        coarse = self._lights.coarse(received, lit, exposure_s)
+        size = (self._camera.width_px, self._camera.height_px)
+        fine_size = (lens.shape[1] * lens.factor, lens.shape[0] * lens.factor)
+        surfaces = self._surfaces
+        depth_m = -float(view.T_world_camera[2, 3])
+        if surfaces is not None and surfaces.visible(view.T_world_camera[:3, 3], exposure_s * gain):
+            rows, columns = surfaces.shape
+            image = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR)
+            matrix = (surfaces.electrons * exposure_s).astype(np.float32)
+            image += cv2.transform(surfaces.radiance(view.T_world_camera), matrix)
+        else:
+            image = coarse
+            veil = self.lit.veil_w_m2_sr(depth_m)
+            if veil.max() > 0.0:
+                image += (self._band_electrons @ veil * exposure_s).astype(np.float32) * self._solid_angle
+        if fine_size == size:
+            cv2.resize(image, size, self._buffer, interpolation=cv2.INTER_LINEAR)
+        else:
+            whole = cv2.resize(image, fine_size, interpolation=cv2.INTER_LINEAR)
+            self._buffer[:] = whole[: size[1], : size[0]]
+        near, shown = lens.locate(received.ray_camera, self._lights.reach_px)
+        index = lit[shown[lit]]
+        self._lights.add_fine(self._buffer, received, near, index, exposure_s)
+        if view.flakes is not None:
+            self._add_flakes(view, exposure_s)
+        return self._buffer
+
+    def _add_flakes(self, view: View, exposure_s: float) -> None:
+        flakes = view.flakes
+        if flakes is None:
+            return
+        colour = self.lit.flake_channel(view) * exposure_s
+        floor = 0.3 * self._cfg.read_noise_e
+        for pixel, light, width in zip(flakes.pixels, flakes.irradiance_w_m2, flakes.sigma_px, strict=True):
+            energy = (colour * light).astype(np.float32)
+            if energy.max() > floor:
+                sigma = float(np.hypot(self._cfg.lens_sigma_px, width))
+                add_spot(self._buffer, pixel, min(sigma, 20.0), energy)

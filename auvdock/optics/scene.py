@@ -1,0 +1,203 @@
+"""Lamps, water, nuisances and lens together: what light reaches the camera at a pose. Shared by both fidelities."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.beacons import BeaconCfg, BeaconLayout
+from auvdock.core.camera import Camera
+from auvdock.core.transforms import invert
+from auvdock.optics.lens import Lens
+from auvdock.optics.nuisance import NuisanceCfg, nuisance_streams
+from auvdock.optics.radiometry import LightSet, Received
+from auvdock.optics.settings import ImagingCfg
+from auvdock.optics.snow import Flakes, MarineSnow
+from auvdock.optics.spots import SpotModel
+from auvdock.optics.water import WaterCfg
+
+__all__ = ["LitScene", "View"]
+
+_WATER_INDEX = 1.34
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What the lamps send into the camera in one frame.
+
+    Attributes:
+        T_world_camera: (4, 4).
+        received: light of every lamp, nuisances included.
+        pixels: (n, 2) positions on the sensor; meaningful where `inside` or near it.
+        inside: (n,) lamps whose centre falls on the sensor.
+        flakes: marine snow, None without.
+    """
+
+    T_world_camera: Array
+    received: Received
+    pixels: Array
+    inside: BoolArray
+    flakes: Flakes | None
+
+
+class LitScene:
+    """Lamps of the station, lamps of others and mirror images, with their fluctuations."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        water: WaterCfg,
+        layout: BeaconLayout,
+        nuisance: NuisanceCfg,
+        cfg: ImagingCfg,
+        T_world_station: Array,
+    ) -> None:
+        """Precompute what does not change within an episode."""
+        self.camera, self.water, self.layout, self.nuisance, self.cfg = camera, water, layout, nuisance, cfg
+        self.T_world_station = T_world_station
+        self._T_station_world = invert(T_world_station)
+        self.lens = Lens(camera, cfg)
+        self.snow = MarineSnow(nuisance.snow_level, self.lens, float(water.attenuation[0]))
+        self._fluctuates = nuisance.flicker != "none" or nuisance.marine_snow != "none"
+        self._mirrors = nuisance.surface_reflection != "none"
+        self.sensor_rng, self._streams = nuisance_streams(np.random.default_rng(0))
+        self._set_lights(())
+        self.reset(np.random.default_rng(0))
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Draw the episode's strangers, flakes and fluctuations; one stream per part."""
+        self.sensor_rng, self._streams = nuisance_streams(rng)
+        self.snow.reset(self._streams["marine_snow"])
+        strangers = self._strangers(self._streams["interfering_lights"])
+        if strangers or self.lights.count != self.lights.station_count:
+            self._set_lights(strangers)
+        n = self.lights.count
+        self._log = self._streams["flicker"].standard_normal(n)
+        self._dark_until = np.full(n, -np.inf)
+        self._occluded_until = np.full(n, -np.inf)
+        self._last_s: float | None = None
+
+    def daylight_w_m2(self, depth_m: float) -> Array:
+        """(3,) downwelling irradiance per band at a depth: E(0) e^{-K_d z}."""
+        surface = self.nuisance.daylight_level.irradiance_w_m2
+        return surface * np.exp(-self.water.diffuse_attenuation * max(depth_m, 0.0))
+
+    def veil_w_m2_sr(self, depth_m: float) -> Array:
+        """(3,) radiance B∞ per band of unbounded water, looking level: E b_b / (2π (a + b_b)).
+
+        Single backscattering of the downwelling light, forward scattering taken as no loss (Gordon 1973).
+        """
+        a, bb = self.water.absorption, self.water.backscattering
+        return self.daylight_w_m2(depth_m) * bb / (2.0 * math.pi * np.maximum(a + bb, 1e-9))
+
+    def look(self, T_world_body: Array, time_s: float) -> View:
+        """Light at the camera now; advances flicker and occlusions to `time_s`."""
+        T_world_camera = T_world_body @ self.camera.T_body_camera
+        received = self.lights.received(self._T_station_world @ T_world_camera)
+        if self._fluctuates:
+            factor = self._fluctuate(time_s, received.range_m)
+            received.core_w_m2[:] *= factor
+            received.halo_w_m2[:] *= factor
+        if self._mirrors:
+            self._mirror(received, T_world_camera)
+        pixels, inside = self.lens.locate(received.ray_camera)
+        flakes = None
+        if self.nuisance.marine_snow != "none":
+            day = float(self.daylight_w_m2(-T_world_camera[2, 3])[0])
+            flakes = self.snow.flakes(T_world_camera, received, day)
+        return View(T_world_camera, received, pixels, inside, flakes)
+
+    def flake_channel(self, view: View) -> Array:
+        """(3,) electrons per second for 1 W/m² of light from flakes: the mean colour of what lights them."""
+        light = view.received.core_w_m2 + view.received.halo_w_m2 + 1e-12
+        return light @ self.lights.electrons_per_j / float(light.sum()) * self.lens.aperture_m2
+
+    def _set_lights(self, strangers: tuple[BeaconCfg, ...]) -> None:
+        images = self._images() if self._mirrors else ()
+        self.lights = LightSet(self.layout, self.water, (*strangers, *images))
+        self._image_slice = slice(self.lights.count - len(images), self.lights.count)
+        self.spots = SpotModel(self.lens, self.lights, self.water, self.cfg)
+
+    def _strangers(self, rng: np.random.Generator) -> tuple[BeaconCfg, ...]:
+        level = self.nuisance.interference_level
+        lamps: list[BeaconCfg] = []
+        for index in range(level.count):
+            x, y, z = rng.uniform((-6.0, -6.0, -2.5), (2.0, 6.0, 3.0))
+            # Keep clear of the mouth: a lamp inside the funnel would be the station's.
+            y += math.copysign(1.5, y)
+            nm = 450.0 if rng.random() < 0.5 else 530.0
+            place = (float(x), float(y), float(z))
+            lamps.append(BeaconCfg(f"stranger{index}", "array", place, (1.0, 0.0, 0.0), nm, level.power_w, 0.35, 90.0))
+        return tuple(lamps)
+
+    def _images(self) -> tuple[BeaconCfg, ...]:
+        """The station's lamps mirrored in the surface z = 0, those inside the funnel left out."""
+        images: list[BeaconCfg] = []
+        rotation, origin = self.T_world_station[:3, :3], self.T_world_station[:3, 3]
+        flip = np.array([1.0, 1.0, -1.0])
+        for beacon, position, axis in zip(
+            self.layout.beacons, self.layout.positions_m, self.layout.axes, strict=True
+        ):
+            if beacon.role == "entrance":
+                continue
+            place = rotation.T @ (flip * (rotation @ position + origin) - origin)
+            way = rotation.T @ (flip * (rotation @ axis))
+            images.append(
+                BeaconCfg(
+                    f"image of {beacon.name}",
+                    beacon.role,
+                    (float(place[0]), float(place[1]), float(place[2])),
+                    (float(way[0]), float(way[1]), float(way[2])),
+                    beacon.wavelength_nm,
+                    beacon.power_w,
+                    beacon.efficiency,
+                    beacon.beam_angle_deg,
+                )
+            )
+        return tuple(images)
+
+    def _mirror(self, received: Received, T_world_camera: Array) -> None:
+        level = self.nuisance.reflection_level
+        part = self._image_slice
+        up = received.ray_camera[part] @ T_world_camera[2, :3]
+        factor = level.share * _fresnel_from_water(np.abs(up)) * (up > 0.0)
+        received.core_w_m2[part] *= factor
+        received.halo_w_m2[part] *= factor
+        rays = received.ray_camera[part]
+        rays += self._streams["surface_reflection"].normal(0.0, 2.0 * level.slope_rad, rays.shape)
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+
+    def _fluctuate(self, time_s: float, range_m: Array) -> Array:
+        flicker, snow = self.nuisance.flicker_level, self.nuisance.snow_level
+        n = self.lights.count
+        step = 0.0 if self._last_s is None else max(time_s - self._last_s, 0.0)
+        self._last_s = time_s
+        stream = self._streams["flicker"]
+        keep = math.exp(-step / flicker.correlation_s)
+        self._log *= keep
+        self._log += math.sqrt(1.0 - keep * keep) * stream.standard_normal(n)
+        std = flicker.log_std_at_10_m * np.sqrt(range_m / 10.0)
+        factor = np.exp(std * self._log - 0.5 * std * std)
+        draws = stream.random((2, n))
+        starts = draws[0] < 1.0 - math.exp(-flicker.dropouts_per_s * step)
+        ends = time_s - flicker.dropout_s * np.log(np.maximum(draws[1], 1e-12))
+        self._dark_until[starts] = ends[starts]
+        factor[self._dark_until > time_s] = 0.0
+        draws = self._streams["marine_snow"].random((2, n))
+        starts = draws[0] < 1.0 - math.exp(-snow.occlusions_per_s * step)
+        ends = time_s - snow.occlusion_s * np.log(np.maximum(draws[1], 1e-12))
+        self._occluded_until[starts] = ends[starts]
+        factor[self._occluded_until > time_s] *= snow.occlusion_transmission
+        return factor
+
+
+def _fresnel_from_water(cosine: Array) -> Array:
+    """Reflectance (n,) for unpolarised light that meets the surface from below (total beyond 48.3°)."""
+    sine2 = np.minimum(_WATER_INDEX**2 * (1.0 - cosine**2), 1.0)
+    inside, outside = cosine, np.sqrt(1.0 - sine2)
+    s = (_WATER_INDEX * inside - outside) / (_WATER_INDEX * inside + outside + 1e-12)
+    p = (inside - _WATER_INDEX * outside) / (inside + _WATER_INDEX * outside + 1e-12)
+    return 0.5 * (s * s + p * p)

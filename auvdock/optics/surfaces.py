@@ -1,0 +1,156 @@
+"""Station and floor in the water: the revised image formation model (Akkaynak & Treibitz 2018).
+
+Per band, I = J e^{-β_D z} + B∞ (1 - e^{-β_B z}) with z the distance along the ray. The direct signal carries the image
+and loses all that is scattered: β_D = c = a + b. The veil is lit by daylight from all sides, to which forward scattering
+is no loss: β_B = a + b_b (Gordon 1973). J = ρ E / π, with E the daylight at depth, shaded from above, plus the spill
+light of the station's own lamps, Φ s / (4π d²) e^{-a d} with a quarter of it for the mean obliquity.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from auvdock.core.arrays import Array
+from auvdock.optics.bands import BANDS_NM, electrons_per_joule
+from auvdock.optics.gl import StaticRenderer
+from auvdock.optics.scene import LitScene
+from auvdock.sim.mj import MjModel, mujoco
+
+__all__ = ["Surfaces"]
+
+_LAMP_M2 = 0.05**2
+"""Least squared distance from a lamp to what it lights: its housing."""
+_GREATEST_RADIANCE = 1.0 / math.pi
+
+
+class Surfaces:
+    """Draws the static geoms of a model at half resolution, through water and lens."""
+
+    def __init__(self, lit: LitScene, model: MjModel) -> None:
+        """Precompute lens maps and what lamps do to each geom; no OpenGL yet."""
+        self._lit = lit
+        camera, lens = lit.camera, lit.lens
+        step = 2 if lens.factor % 2 == 0 else 1
+        self.shape = (lens.shape[0] * lens.factor // step, lens.shape[1] * lens.factor // step)
+        rows, columns = self.shape
+        x, y = np.meshgrid((np.arange(columns) + 0.5) * step - 0.5, (np.arange(rows) + 0.5) * step - 0.5)
+        tangents = camera.normalise(np.column_stack([x.ravel(), y.ravel()])).reshape(rows, columns, 2)
+        half_x, half_y = (1.02 * float(np.abs(tangents[:, :, k]).max()) for k in range(2))
+        width = round(columns * half_x / float(np.abs(tangents[rows // 2, :, 0]).max()))
+        height = round(rows * half_y / float(np.abs(tangents[:, columns // 2, 1]).max()))
+        self._renderer = StaticRenderer(model, width, height, half_x, half_y)
+        map_x = (tangents[:, :, 0] / half_x + 1.0) * 0.5 * width - 0.5
+        # The renderer's rows run from the bottom up.
+        map_y = (1.0 - tangents[:, :, 1] / half_y) * 0.5 * height - 0.5
+        self._map_x, self._map_y = map_x.astype(np.float32), map_y.astype(np.float32)
+        self._stretch = np.sqrt(1.0 + np.sum(tangents**2, axis=2)).astype(np.float32)
+        self._rays = lens.rays.astype(np.float32)
+
+        water = lit.water
+        self._beta_direct = water.attenuation
+        self._beta_veil = water.absorption + water.backscattering
+        per_joule = np.array([electrons_per_joule(nm) for nm in BANDS_NM])
+        self.electrons = (per_joule * lens.aperture_m2 * float(np.median(lens.solid_angle_sr))).T
+        """(3, 3) electrons per second of each channel (row) for radiance 1 W/(m² sr) in each band (column)."""
+        solid = lens.solid_angle_sr / np.median(lens.solid_angle_sr)
+        size = (camera.width_px, camera.height_px)
+        self.vignette = cv2.resize(solid.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)[:, :, None]
+
+        count = lit.lights.station_count
+        nm = np.array([beacon.wavelength_nm for beacon in lit.layout.beacons])
+        bands = np.array([np.interp(nm, BANDS_NM, row) for row in np.eye(3)]).T
+        spill = lit.lights.flux_w[:count] * lit.cfg.lamp_spill / (16.0 * math.pi)
+        rotation, origin = lit.T_world_station[:3, :3], lit.T_world_station[:3, 3]
+        self._lamps = lit.lights.positions_m[:count] @ rotation.T + origin
+        self._spill_w_sr = spill[:, None] * bands
+        self._lamp_absorption = lit.lights.absorption_per_m[:count]
+        self._geoms = _Geoms(model)
+        nearest = np.array([self._geoms.distance_m(lamp) for lamp in self._lamps]).T
+        loss = np.exp(-self._lamp_absorption * nearest) / (nearest**2 + _LAMP_M2)
+        self._lamp_irradiance = loss @ self._spill_w_sr
+
+    def close(self) -> None:
+        """Free OpenGL's context."""
+        self._renderer.close()
+
+    def visible(self, position_world_m: Array, sensitivity_s: float) -> bool:
+        """Whether any surface can stand out of the noise, in the most favourable case, from a position (3,)."""
+        daylight = self._lit.daylight_w_m2(-float(position_world_m[2]))
+        through = np.exp(-self._geoms.distance_m(position_world_m)[:, None] * self._beta_direct)
+        radiance = (self._lamp_irradiance + daylight) * through * _GREATEST_RADIANCE
+        signal = float((radiance @ self.electrons.T).max(initial=0.0)) * sensitivity_s
+        veil = float((self.electrons @ self._lit.veil_w_m2_sr(-float(position_world_m[2]))).max()) * sensitivity_s
+        return signal > math.sqrt(self._lit.cfg.read_noise_e**2 + veil)
+
+    def radiance(self, T_world_camera: Array) -> NDArray[np.float32]:
+        """Radiance per band (h, w, 3) in W/(m² sr), blue, green, red, at half resolution.
+
+        Raises:
+            GraphicsError: no OpenGL context can be had.
+        """
+        colour, depth = self._renderer.render(T_world_camera)
+        colour = cv2.remap(colour, self._map_x, self._map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        depth = cv2.remap(depth, self._map_x, self._map_y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+        distance = cv2.multiply(depth, self._stretch)
+        depth_m = -float(T_world_camera[2, 3])
+        daylight = self._lit.daylight_w_m2(depth_m)
+        veil = self._lit.veil_w_m2_sr(depth_m)
+        light = self._lamp_light(T_world_camera, distance)
+        light += daylight.astype(np.float32)
+        light = cv2.resize(light, (self.shape[1], self.shape[0]), interpolation=cv2.INTER_LINEAR)
+        albedo = cv2.cvtColor(colour, cv2.COLOR_RGB2BGR)
+        scene = cv2.multiply(albedo, light, scale=1.0 / (255.0 * math.pi), dtype=cv2.CV_32F)
+        np.minimum(distance, np.float32(1e3), out=distance)
+        path = np.repeat(distance[:, :, None], 3, axis=2)
+        through = cv2.exp(path * (-self._beta_direct).astype(np.float32))
+        image = cv2.multiply(scene, through)
+        if veil.max() > 0.0:
+            lost = cv2.exp(path * (-self._beta_veil).astype(np.float32))
+            image += (1.0 - lost) * veil.astype(np.float32)
+        return image
+
+    def _lamp_light(self, T_world_camera: Array, distance: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Spill light of the lamps (rows, columns, 3) on what is seen, per band, on the coarse grid of the lens."""
+        rows, columns = self._lit.lens.shape
+        z = cv2.resize(distance, (columns, rows), interpolation=cv2.INTER_NEAREST).reshape(-1, 1)
+        np.minimum(z, np.float32(1e3), out=z)
+        points = self._rays * z
+        lamps = ((self._lamps - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]).astype(np.float32)
+        d2 = points @ (-2.0 * lamps.T)
+        d2 += np.sum(lamps**2, axis=1)
+        d2 += z * z
+        np.maximum(d2, np.float32(_LAMP_M2), out=d2)
+        weight = cv2.exp(cv2.sqrt(d2) * (-self._lamp_absorption).astype(np.float32))
+        weight /= d2
+        return (weight @ self._spill_w_sr.astype(np.float32)).reshape(rows, columns, 3)
+
+
+class _Geoms:
+    """Distances to the static geoms of a model: exact for boxes and planes, to the bounding sphere for others."""
+
+    def __init__(self, model: MjModel) -> None:
+        data: Any = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        fixed = model.body_weldid[model.geom_bodyid] == 0
+        shown = model.geom_group <= 2
+        index = np.flatnonzero(fixed & shown)
+        self._place = np.array(data.geom_xpos)[index]
+        self._rotation = np.array(data.geom_xmat)[index].reshape(-1, 3, 3)
+        kind = np.array(model.geom_type)[index]
+        size = np.array(model.geom_size)[index]
+        plane, box = kind == int(mujoco.mjtGeom.mjGEOM_PLANE), kind == int(mujoco.mjtGeom.mjGEOM_BOX)
+        size[plane] = np.where(size[plane] > 0.0, size[plane], 1e6) * (1.0, 1.0, 0.0)
+        self._round = np.where(plane | box, 0.0, np.array(model.geom_rbound)[index])
+        size[~(plane | box)] = 0.0
+        self._size = size
+
+    def distance_m(self, point: Array) -> Array:
+        """(n,) distance from a point (3,) in the world to each geom, 0 inside."""
+        local = np.einsum("nji,nj->ni", self._rotation, point - self._place)
+        outside = np.maximum(np.abs(local) - self._size, 0.0)
+        return np.maximum(np.sqrt(np.einsum("ni,ni->n", outside, outside)) - self._round, 0.0)
