@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ __all__ = ["view"]
 _MAGIC = b"RRF"
 _LAUNCH = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
 """`python -m rerun_cli` would lose the viewer's exit code."""
+_SOURCE_PLACE = re.compile(r"(os error at )?\S+\.rs:\d+: ")
 
 
 def view(path: Path) -> None:
@@ -47,7 +49,7 @@ def view(path: Path) -> None:
 
 
 def _reason(stderr: str) -> str:
-    """The line that says most: the last error, else the last line."""
-    lines = [line.strip() for line in stderr.splitlines() if line.strip()]
+    """The line that says most: the last error, else the last line; without the places in the viewer's own source."""
+    lines = [_SOURCE_PLACE.sub("", line).strip().rstrip(".") for line in stderr.splitlines() if line.strip()]
     errors = [line for line in lines if line.startswith("Error")]
     return (errors or lines or ["no message"])[-1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import subprocess
 import sys
@@ -83,6 +84,26 @@ def test_an_interrupted_run_leaves_everything(tmp_path: Path) -> None:
     assert "KeyboardInterrupt" in errors
     assert output.split() == [str(COUNT)]
     assert assert_readable(path, at_least=COUNT) == COUNT
+
+
+def test_a_slow_episode_reaches_the_file_every_half_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 100.0
+    monkeypatch.setattr("auvdock.recording.rerun_recorder.time.monotonic", lambda: now_s)
+    recorder = RerunRecorder(tmp_path / "run.rrd")
+    setup = make_setup(160, 90)
+    recorder.on_start(setup)
+    for tick in ticks(setup, 8):
+        recorder.on_tick(tick)
+        now_s += 0.2
+    frames: list[int] = []
+    for _ in range(100):  # the writing thread takes a moment; until then the file may end within a message
+        with contextlib.suppress(RuntimeError):
+            frames = Recording(tmp_path / "run.rrd").column(paths.VEHICLE, "Transform3D:translation").frames
+        if len(frames) >= 8:
+            break
+        time.sleep(0.05)
+    assert frames == list(range(8))  # two batches of four periods: 0.0, 0.2, 0.4, 0.6 s
+    recorder.close()
 
 
 def test_two_recorders_do_not_mix(tmp_path: Path) -> None:

@@ -39,8 +39,12 @@ def test_the_viewer_gets_the_file(tmp_path: Path, recording: Path, monkeypatch: 
 def test_a_viewer_that_does_not_start_says_why(
     tmp_path: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stand_in(tmp_path, monkeypatch, "print('Error: no DISPLAY is set', file=sys.stderr); print('bye'); sys.exit(1)")
-    with pytest.raises(AuvdockError, match="no DISPLAY is set"):
+    stand_in(
+        tmp_path,
+        monkeypatch,
+        "print('Error: os error at /src/a.rs:7: no DISPLAY is set.', file=sys.stderr); print('bye'); sys.exit(1)",
+    )
+    with pytest.raises(AuvdockError, match="code 1: Error: no DISPLAY is set;"):
         view(recording)
 
 
