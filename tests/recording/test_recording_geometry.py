@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from auvdock.controllers.modes import MODES
 from auvdock.core.contracts import BLUE, RED
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 from auvdock.recording.meshes import Mesh, beam_cone, frustum
@@ -107,6 +108,7 @@ def test_classes_differ_and_unknown_ones_have_a_colour() -> None:
 
 
 def test_modes_are_numbered_and_only_changes_are_told() -> None:
+    assert KNOWN_MODES == MODES
     follower = ModeFollower()
     assert [follower.number(mode) for mode in KNOWN_MODES] == list(range(len(KNOWN_MODES)))
     own = follower.number("spiral")
