@@ -84,6 +84,7 @@ class DockingWorld:
         self._steps_per_frame = round(cfg.sim.physics_hz / cfg.camera.rate_hz)
         self._step_count = 0
         self._last_frame_step = -1
+        self._truth: Truth | None = None
 
     def reset(self, seed: int) -> None:
         """Start a new episode; the seed alone decides everything that is drawn in it."""
@@ -97,12 +98,14 @@ class DockingWorld:
         (self._beacon_sensor or self.imager).reset(camera)
         self._step_count = 0
         self._last_frame_step = -self._steps_per_frame
+        self._truth = None
 
     def step(self, values: Array) -> None:
         """Apply actuator commands (n,) in [-1, 1] for one control period."""
         for _ in range(self._steps_per_control):
             self.simulator.step(values)
-            self._step_count += 1
+        self._step_count += self._steps_per_control
+        self._truth = None
 
     def sense(self) -> Sensed:
         """Sample the sensors now; once per control period."""
@@ -110,20 +113,22 @@ class DockingWorld:
         if self._step_count - self._last_frame_step < self._steps_per_frame:
             return Sensed(proprioception, None, None)
         self._last_frame_step = self._step_count
-        truth = self.simulator.truth
+        truth = self.truth
         if self._beacon_sensor is not None:
             return Sensed(proprioception, None, self._beacon_sensor.detect(truth.T_world_body, truth.time_s))
         return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s), None)
 
     @property
     def truth(self) -> Truth:
-        """The simulator's state, for metrics and rewards."""
-        return self.simulator.truth
+        """The simulator's state, for metrics and rewards; read once a control period, however often it is asked for."""
+        if self._truth is None:
+            self._truth = self.simulator.truth
+        return self._truth
 
     @property
     def end(self) -> str | None:
         """Why the episode is over, apart from success and the pilot's own decision: a failure reason, or None."""
-        truth = self.simulator.truth
+        truth = self.truth
         if truth.diverged:
             return "diverged"
         if truth.peak_contact_force_n > self.cfg.limits.collision_force_n:
@@ -135,7 +140,7 @@ class DockingWorld:
     @property
     def is_success(self) -> bool:
         """Latched, held, and within the entry limits of `LatchCfg`."""
-        return self.simulator.truth.docked
+        return self.truth.docked
 
     def close(self) -> None:
         """Release the renderer."""
