@@ -8,15 +8,9 @@ import numpy as np
 
 from auvdock.optics.scene import LitScene, View
 from auvdock.optics.sensor import SensorScale
-from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.spots import Spots
 
-__all__ = ["predicted_share", "saturation_level_e_s"]
-
-
-def saturation_level_e_s(cfg: ImagingCfg, sensitivity_s: float) -> float:
-    """Electrons per second at which a sample counts as saturated, for a sensitivity (time × gain)."""
-    return SensorScale(cfg, 1.0).saturated_e / sensitivity_s
+__all__ = ["predicted_share"]
 
 
 def predicted_share(lit: LitScene, view: View, spots: Spots | None = None) -> Callable[[float], float]:
@@ -26,4 +20,5 @@ def predicted_share(lit: LitScene, view: View, spots: Spots | None = None) -> Ca
     """
     shown = lit.spots.spots(view.received, np.flatnonzero(view.inside)) if spots is None else spots
     saturated_e = SensorScale(lit.cfg, 1.0).saturated_e
-    return lambda sensitivity_s: lit.spots.saturated_share(shown, saturated_e / sensitivity_s)
+    model = lit.spots
+    return lambda sensitivity_s: model.share(model.saturated_area_px2(shown, saturated_e / sensitivity_s))

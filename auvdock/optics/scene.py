@@ -138,9 +138,7 @@ class LitScene:
         images: list[BeaconCfg] = []
         rotation, origin = self.T_world_station[:3, :3], self.T_world_station[:3, 3]
         flip = np.array([1.0, 1.0, -1.0])
-        for beacon, position, axis in zip(
-            self.layout.beacons, self.layout.positions_m, self.layout.axes, strict=True
-        ):
+        for beacon, position, axis in zip(self.layout.beacons, self.layout.positions_m, self.layout.axes, strict=True):
             if beacon.role == "entrance":
                 continue
             place = rotation.T @ (flip * (rotation @ position + origin) - origin)

@@ -76,10 +76,23 @@ class SpotModel:
         profile += gauss
         return Spots(core, halo, np.sqrt(sigma2), profile, self._channel[index])
 
-    def saturated_share(self, spots: Spots, full_scale_e_s: float) -> float:
-        """Share of the image's samples above a level in electrons per second; overlap of spots is not counted."""
-        level = spots.profile[:, :, None] * spots.channel[:, None, :]
-        level *= 2.5 / full_scale_e_s
+    def saturated_area_px2(self, spots: Spots, level_e_s: float) -> Array:
+        """(m, 3) area of each spot above a level in electrons per second, per channel; overlap is not counted."""
+        level = spots.profile[:, None, :] * (spots.channel * (2.5 / level_e_s))[:, :, None]
         level -= 2.0
-        np.clip(level, 0.0, 1.0, out=level)
-        return float(self.ring_px2 @ level.sum(axis=(0, 2))) / self._samples
+        np.maximum(level, 0.0, out=level)
+        np.minimum(level, 1.0, out=level)
+        return level @ self.ring_px2
+
+    def share(self, area_px2: Array) -> float:
+        """Share of the image's samples that areas (m, 3) are."""
+        return float(area_px2.sum()) / self._samples
+
+    def at_distance(self, spots: Spots, distance_px: Array) -> Array:
+        """(m, m) irradiance per pixel at `distance_px` (m, m) from the lights along the second axis."""
+        place = np.log(np.maximum(distance_px, self.radii_px[0]))
+        place -= self._log_first
+        place *= 1.0 / self._log_step
+        index = np.minimum(place.astype(np.int64), _RADII - 1)
+        index += np.arange(0, index.shape[0] * _RADII, _RADII)
+        return spots.profile.ravel().take(index)

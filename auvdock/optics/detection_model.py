@@ -1,0 +1,184 @@
+"""How a detector answers to lights: found or missed, merged, how precisely, and what it sees that is not there.
+
+The parameters are fitted on rendered frames (`optics.detection_fit`), one file per detector in `assets/detection`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from auvdock.assets import asset
+from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.contracts import BLUE, RED, Detections
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import load_toml
+
+__all__ = ["Candidates", "DetectionModelCfg", "draw_detections", "load_detection_model", "merge_close"]
+
+
+@dataclass(frozen=True)
+class DetectionModelCfg:
+    """Behaviour of one detector.
+
+    A light is found with probability 1 / (1 + (contrast_50_dn / C)^slope), C its contrast in codes above its
+    surroundings.
+    """
+
+    name: str
+    """The detector."""
+    source: str
+    """What it was fitted on."""
+    contrast_50_dn: float
+    """Contrast at which half of the lights are found."""
+    slope: float
+    """Steepness in ln C."""
+    ceiling: float
+    """Probability of finding a light of any contrast."""
+    merge_px: float
+    """Two point-like lights closer than this are one."""
+    merge_radii: float
+    """In addition this many times the sum of the radii of their saturated discs."""
+    centre_floor_px: float
+    """Standard deviation of a bright light's centre, per axis."""
+    centre_noise: float
+    """In addition this times the spot's width over its signal-to-noise ratio."""
+    score_gain: float
+    """Score = s / (s + 10) with s this times contrast over noise."""
+    false_alarms: float
+    """Mean number of detections per frame that belong to no light."""
+    wrong_colour: float
+    """Share of detections of the wrong class."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no probability or no width."""
+        for name in ("contrast_50_dn", "slope", "score_gain"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise ConfigError(f"detection.{name}", getattr(self, name), "a number above 0")
+        for name in ("merge_px", "merge_radii", "centre_floor_px", "centre_noise", "false_alarms"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise ConfigError(f"detection.{name}", getattr(self, name), "0 or more")
+        for name in ("ceiling", "wrong_colour"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ConfigError(f"detection.{name}", getattr(self, name), "a probability of 0 to 1")
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Lights on the sensor as a detector meets them.
+
+    Attributes:
+        pixels: (m, 2) positions.
+        contrast_dn: (m,) code at the centre above the code of its surroundings, in the light's brightest channel.
+        noise_dn: (m,) standard deviation of the code there.
+        radius_px: (m,) radius of the saturated disc, 0 without one.
+        width_px: (m,) width of the spot.
+        flux: (m,) weight of the light in a merged centre.
+        red: (m,) whether red is its brightest channel.
+    """
+
+    pixels: Array
+    contrast_dn: Array
+    noise_dn: Array
+    radius_px: Array
+    width_px: Array
+    flux: Array
+    red: BoolArray
+
+
+def load_detection_model(name: str) -> DetectionModelCfg:
+    """The fitted model of a detector.
+
+    Raises:
+        ConfigError: no model was fitted for a detector of that name.
+    """
+    return load_toml(DetectionModelCfg, asset("detection", name))
+
+
+def draw_detections(
+    seen: Candidates, model: DetectionModelCfg, size_px: tuple[int, int], rng: np.random.Generator
+) -> Detections:
+    """What the detector gives for one frame; brightest first, so that the order tells nothing of the layout.
+
+    Args:
+        seen: the lights on the sensor.
+        model: the detector.
+        size_px: width and height of the image.
+        rng: source of the draws.
+    """
+    m = len(seen.flux)
+    chance, noise = rng.random((2, m)), rng.standard_normal((m, 2))
+    alarms = rng.poisson(model.false_alarms) if model.false_alarms > 0.0 else 0
+    merged = merge_close(seen, model)
+    contrast = merged.contrast_dn
+    found = np.maximum(contrast, 1e-9) ** -model.slope
+    found *= model.contrast_50_dn**model.slope
+    found += 1.0
+    hit = (chance[0] * found < model.ceiling) & (contrast > 0.0)
+    index = np.flatnonzero(hit)
+    index = index[(-contrast[index]).argsort(kind="stable")]
+    snr = contrast[index] / merged.noise_dn[index]
+    spread = np.sqrt(model.centre_floor_px**2 + (model.centre_noise * merged.width_px[index] / snr) ** 2)
+    centre = merged.pixels[index] + noise[index] * spread[:, None]
+    strength = model.score_gain * snr
+    score = strength / (strength + 10.0)
+    wrong = chance[1, index] < model.wrong_colour
+    class_id = np.where(merged.red[index] != wrong, RED, BLUE)
+    half = np.maximum(merged.radius_px[index], merged.width_px[index])[:, None]
+    xyxy = np.concatenate([centre - half, centre + half], axis=1)
+    if alarms:
+        ghosts = rng.random((alarms, 2)) * np.array(size_px) - 0.5
+        centre = np.concatenate([centre, ghosts])
+        xyxy = np.concatenate([xyxy, np.concatenate([ghosts - 2.0, ghosts + 2.0], axis=1)])
+        score = np.concatenate([score, rng.uniform(0.2, 0.5, alarms)])
+        class_id = np.concatenate([class_id, rng.integers(0, 2, alarms)])
+    return Detections(xyxy, centre, score, class_id)
+
+
+def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
+    """Lights too close to be told apart become the brightest of them, at their common centre of light.
+
+    Lights that have been merged into another keep their place with contrast 0.
+    """
+    m = len(seen.flux)
+    if m < 2:
+        return seen
+    dx = seen.pixels[:, 0] - seen.pixels[:, :1]
+    dy = seen.pixels[:, 1] - seen.pixels[:, 1:]
+    reach = model.merge_radii * seen.radius_px
+    limit = reach + (reach[:, None] + model.merge_px)
+    close = dx * dx + dy * dy < limit * limit
+    if np.count_nonzero(close) == m:
+        return seen
+    pixels, contrast, flux = seen.pixels.copy(), seen.contrast_dn.copy(), seen.flux.copy()
+    radius = seen.radius_px.copy()
+    lead = list(range(m))
+    for i in range(m):
+        for j in range(i + 1, m):
+            if close[i, j] and contrast[i] > 0.0 and contrast[j] > 0.0:
+                a, b = _root(lead, i), _root(lead, j)
+                if a != b:
+                    lead[max(a, b)] = min(a, b)
+    groups: dict[int, list[int]] = {}
+    for i in range(m):
+        groups.setdefault(_root(lead, i), []).append(i)
+    for members in groups.values():
+        if len(members) < 2:
+            continue
+        first = max(members, key=lambda k: float(seen.flux[k]))
+        weight = seen.flux[members]
+        pixels[first] = weight @ seen.pixels[members] / weight.sum()
+        flux[first] = weight.sum()
+        radius[first] = math.sqrt(float((seen.radius_px[members] ** 2).sum()))
+        for k in members:
+            if k != first:
+                contrast[k] = 0.0
+    return Candidates(pixels, contrast, seen.noise_dn, radius, seen.width_px, flux, seen.red)
+
+
+def _root(lead: list[int], i: int) -> int:
+    while lead[i] != i:
+        i = lead[i]
+    return i

@@ -1,0 +1,158 @@
+"""The `beacons` fidelity: detections from the radiometry alone, without an image."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from auvdock.core.arrays import Array
+from auvdock.core.beacons import BeaconLayout
+from auvdock.core.camera import Camera
+from auvdock.core.contracts import Detections
+from auvdock.optics.bands import BANDS_NM, electrons_per_joule
+from auvdock.optics.detection_model import (
+    Candidates,
+    DetectionModelCfg,
+    draw_detections,
+    load_detection_model,
+)
+from auvdock.optics.exposure import AutoExposure
+from auvdock.optics.metering import predicted_share
+from auvdock.optics.nuisance import NuisanceCfg
+from auvdock.optics.scene import LitScene, View
+from auvdock.optics.sensor import SensorScale
+from auvdock.optics.settings import ImagingCfg
+from auvdock.optics.spots import Spots
+from auvdock.optics.water import WaterCfg
+
+__all__ = ["BeaconSensor", "candidates_in_view"]
+
+
+class BeaconSensor:
+    """Gives what a detector would give, from the same lamps, water, nuisances and exposure law as the renderer."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        water: WaterCfg,
+        layout: BeaconLayout,
+        nuisance: NuisanceCfg,
+        cfg: ImagingCfg,
+        T_world_station: Array,
+        detector_name: str = "threshold",
+        model: DetectionModelCfg | None = None,
+    ) -> None:
+        """Precompute tables.
+
+        Args:
+            camera: intrinsics, distortion and mounting.
+            water: what lies between.
+            layout: the station's beacons.
+            nuisance: what makes the scene hard.
+            cfg: the camera as an instrument.
+            T_world_station: (4, 4) pose of the station frame.
+            detector_name: detector whose fitted behaviour is drawn from.
+            model: that behaviour itself, in place of the fitted one.
+
+        Raises:
+            ConfigError: nothing was fitted for a detector of that name.
+        """
+        self.model = model if model is not None else load_detection_model(detector_name)
+        self.lit = LitScene(camera, water, layout, nuisance, cfg, T_world_station)
+        self.exposure = AutoExposure(cfg.exposure)
+        self._size = (camera.width_px, camera.height_px)
+        self._rng = np.random.default_rng(0)
+        self.reset(np.random.default_rng(0))
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Start an episode: new nuisances, exposure from scratch."""
+        self.lit.reset(rng)
+        self._rng = self.lit.sensor_rng
+        self.exposure.reset()
+
+    def detect(self, T_world_body: Array, time_s: float) -> Detections:
+        """Detections of a frame from a body pose (4, 4)."""
+        view = self.lit.look(T_world_body, time_s)
+        index = np.flatnonzero(view.inside)
+        spots = self.lit.spots.spots(view.received, index)
+        exposure = self.exposure
+        if not exposure.settled:
+            exposure.settle(predicted_share(self.lit, view, spots))
+        seen, share = candidates_in_view(self.lit, view, spots, exposure.exposure_s, exposure.gain)
+        exposure.update(share)
+        return draw_detections(seen, self.model, self._size, self._rng)
+
+
+def candidates_in_view(
+    lit: LitScene, view: View, spots: Spots, exposure_s: float, gain: float
+) -> tuple[Candidates, float]:
+    """The lights on the sensor as a detector meets them, and the saturated share of the image.
+
+    A light's surroundings are the cores and halos of all others at its centre, and the veil of daylight.
+
+    Args:
+        lit: the scene.
+        view: its lamps in this frame.
+        spots: profiles of those whose centre is on the sensor, in the order of `view.inside`.
+        exposure_s: exposure time.
+        gain: analogue gain.
+    """
+    pixels = view.pixels[view.inside]
+    scale = SensorScale(lit.cfg, gain)
+    model = lit.spots
+    area = model.saturated_area_px2(spots, scale.saturated_e / exposure_s)
+    share = model.share(area)
+    channel = spots.channel * exposure_s
+    best = channel.argmax(axis=1)
+    dx = pixels[:, 0] - pixels[:, :1]
+    dy = pixels[:, 1] - pixels[:, 1:]
+    spread = model.at_distance(spots, np.sqrt(dx * dx + dy * dy))
+    level = spread * channel.T[best]
+    around = level.sum(axis=1)
+    own = level.diagonal()
+    around -= own
+    if lit.nuisance.daylight != "none":
+        veil = _band_electrons(lit) @ lit.veil_w_m2_sr(-float(view.T_world_camera[2, 3])) * exposure_s
+        around += veil[best]
+    contrast = np.minimum(scale.codes(around + own), 255.0) - np.minimum(scale.codes(around), 255.0)
+    seen = Candidates(
+        pixels,
+        contrast,
+        scale.noise_dn(around + own),
+        np.sqrt(area.max(axis=1, initial=0.0) * (1.0 / math.pi)),
+        spots.sigma_px,
+        own,
+        best == 0,
+    )
+    if view.flakes is None:
+        return seen, share
+    return _with_flakes(lit, view, seen, scale, exposure_s), share
+
+
+def _with_flakes(lit: LitScene, view: View, seen: Candidates, scale: SensorScale, exposure_s: float) -> Candidates:
+    """Flakes of snow among the lights: to a detector they are lights."""
+    flakes = view.flakes
+    if flakes is None:
+        return seen
+    sigma = np.hypot(lit.cfg.lens_sigma_px, flakes.sigma_px)
+    colour = lit.flake_channel(view) * exposure_s
+    best = int(np.argmax(colour))
+    peak = flakes.irradiance_w_m2 * colour[best] / (2.0 * math.pi * sigma * sigma)
+    contrast = np.minimum(scale.codes(peak), 255.0)
+    shown = np.flatnonzero(contrast > 2.0)
+    return Candidates(
+        np.concatenate([seen.pixels, flakes.pixels[shown]]),
+        np.concatenate([seen.contrast_dn, contrast[shown]]),
+        np.concatenate([seen.noise_dn, scale.noise_dn(peak[shown])]),
+        np.concatenate([seen.radius_px, np.zeros(len(shown))]),
+        np.concatenate([seen.width_px, sigma[shown]]),
+        np.concatenate([seen.flux, peak[shown]]),
+        np.concatenate([seen.red, np.full(len(shown), best == 0)]),
+    )
+
+
+def _band_electrons(lit: LitScene) -> Array:
+    """(3, 3) electrons per second and pixel for radiance 1 W/(m² sr) per band, in the middle of the image."""
+    per_joule = np.array([electrons_per_joule(nm) for nm in BANDS_NM])
+    return (per_joule * lit.lens.aperture_m2 * lit.lens.rad_per_px**2).T
