@@ -50,7 +50,7 @@ class SimCfg:
 
 
 class HistoryEntry(NamedTuple):
-    """State before one step and the command given in it."""
+    """State before one step and the command given in it; the command is empty for a state in which a step ended."""
 
     time_s: float
     qpos: list[float]
@@ -65,7 +65,8 @@ class Simulator:
 
     Each step: `mj_step1`, M_A into the free joint's 6×6 block of `data.M`, `mj_factorM`, the water's forces into
     `qfrc_applied`, `mj_step2`. A state that is not finite or absurd (faster than 10 m/s or 50 rad/s, further than
-    200 m from the station) freezes the simulator: `truth.diverged` is True and `history` keeps the last 240 steps.
+    200 m from the origin) freezes the simulator at the last sane state: `truth.diverged` is True, and `history` keeps
+    the last 240 steps with the absurd state as its last entry.
 
     Attributes:
         cfg: configuration.
@@ -142,32 +143,40 @@ class Simulator:
         quat_wxyz: Array,
         rng: np.random.Generator,
         current: CurrentCfg | None = None,
+        nu_relative_body: Array | None = None,
     ) -> None:
-        """Start an episode: at rest relative to the water, actuators at rest, latch open.
+        """Start an episode: at rest relative to the water unless told otherwise, actuators at rest, latch open.
 
         Args:
             position_world_m: (3,) of the body frame's origin.
             quat_wxyz: (4,) of the body frame; normalised here.
             rng: spawns one generator for the water and one for the sensors.
             current: in place of the configured one, for this episode.
+            nu_relative_body: (6,) velocity through the water, body axes, m/s and rad/s; None is at rest.
 
         Raises:
-            ValueError: wrong shapes, or a quaternion of no length.
+            ValueError: wrong shapes, a quaternion of no length, or a state that is not finite or absurd.
         """
         check_shape("position_world_m", position_world_m, (3,))
         check_shape("quat_wxyz", quat_wxyz, (4,))
         length = float(np.linalg.norm(quat_wxyz))
         if not length > 1e-6:
             raise ValueError("quat_wxyz has no length")
+        nu = np.zeros(6) if nu_relative_body is None else nu_relative_body
+        check_shape("nu_relative_body", nu, (6,))
+        qpos = [*position_world_m.tolist(), *(quat_wxyz / length).tolist()]
+        if is_absurd(qpos, nu.tolist()):
+            raise ValueError(f"cannot start at {position_world_m} with {nu}")
         water_rng, sensor_rng = rng.spawn(2)
         mujoco.mj_resetData(self.model, self._data)
         self._ocean.reset(current if current is not None else self.cfg.current, water_rng)
         self._sensors.reset(sensor_rng)
         self._actuators.reset()
         self._latch.reset()
-        self._qpos[:3] = position_world_m
-        self._qpos[3:7] = quat_wxyz / length
-        self._qvel[:3] = self._ocean.velocity(float(position_world_m[2]))
+        self._qpos[:] = qpos
+        rotation = np.array(rotation_rows(*qpos[3:])).reshape(3, 3)
+        self._qvel[:3] = np.array(self._ocean.velocity(qpos[2])) + rotation @ nu[:3]
+        self._qvel[3:] = nu[3:]
         self._steps = 0
         self._diverged = False
         self._contacts.reset()
@@ -193,7 +202,7 @@ class Simulator:
         qvel: list[float] = self._qvel.tolist()
         self.history.append(HistoryEntry(self.time_s, qpos, qvel, list(command)))
         if is_absurd(qpos, qvel):
-            self._observe()
+            self._freeze()
             return
         mujoco.mj_step1(model, data)
         rotation = self._xmat
@@ -282,9 +291,10 @@ class Simulator:
         qpos: list[float] = self._qpos.tolist()
         qvel: list[float] = self._qvel.tolist()
         if is_absurd(qpos, qvel):
-            self._diverged = True
-            self._nose_m, self._axis_angle_rad = (math.nan, math.nan, math.nan), math.nan
+            self.history.append(HistoryEntry(self.time_s, qpos, qvel, []))
+            self._freeze()
             return
+        self._sane = qpos, qvel
         r00, r01, r02, r10, _, _, r20, _, _ = rotation_rows(*qpos[3:7])
         reach = self.vehicle.nose_x_m
         nose = qpos[0] + reach * r00, qpos[1] + reach * r10, qpos[2] + reach * r20 + self.station.depth_m
@@ -294,6 +304,13 @@ class Simulator:
         inward = -(qvel[0] + reach * (r01 * qvel[5] - r02 * qvel[4]))
         if self._latch.update(self.time_s, nose, inward, angle):
             self._close_latch(qpos)
+
+    def _freeze(self) -> None:
+        """Mark as diverged and go back to the last sane state, so that nobody downstream meets a NaN."""
+        self._diverged = True
+        self._truth = None
+        self._qpos[:], self._qvel[:] = self._sane
+        self._contacts.force_n = 0.0
 
     def _close_latch(self, qpos: list[float]) -> None:
         """Weld the body where it is, at the nose, as a pawl behind the bow would."""

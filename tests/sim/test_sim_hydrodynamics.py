@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sim_bench import REMUS, trimmed
+
+from auvdock.core.arrays import Array
+from auvdock.core.marine import flip_matrix, flip_twist
+from auvdock.core.transforms import rotation_from_quat_wxyz
+from auvdock.sim.hydrodynamics import Hydrodynamics
+
+
+def skew(vector: Array) -> Array:
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def coriolis_matrix(mass: Array, nu: Array) -> Array:
+    """C(ν) of Fossen (2011), equation 6.43."""
+    first = skew(mass[:3, :3] @ nu[:3] + mass[:3, 3:] @ nu[3:])
+    second = skew(mass[3:, :3] @ nu[:3] + mass[3:, 3:] @ nu[3:])
+    return np.block([[np.zeros((3, 3)), -first], [-first, -second]])
+
+
+def random_rotation(rng: np.random.Generator) -> Array:
+    quat = rng.standard_normal(4)
+    return rotation_from_quat_wxyz(quat / np.linalg.norm(quat))
+
+
+def random_nu(rng: np.random.Generator) -> Array:
+    return rng.standard_normal(6) * rng.uniform(0.1, 2.0)
+
+
+def damping(nu: Array) -> Array:
+    return (
+        REMUS.linear_damping_body @ nu
+        + REMUS.quadratic_damping_body @ (np.abs(nu) * nu)
+        + abs(nu[0]) * REMUS.lift_damping_body @ nu
+    )
+
+
+def test_wrench_is_fossens_formula_written_out() -> None:
+    """Against equations 6.43, 6.53 and 4.6 as plain matrices; relative tolerance 1e-12."""
+    rng = np.random.default_rng(1)
+    hydrodynamics = Hydrodynamics(REMUS, (0, 1, 2, 3, 4))
+    mass = REMUS.added_mass_body
+    for _ in range(200):
+        rotation, nu = random_rotation(rng), random_nu(rng)
+        gust = np.array([*rng.standard_normal(2), 0.0])
+        actuators = rng.uniform(-1.0, 1.0, 7)
+        fins = np.where([actuator.kind == "fin" for actuator in REMUS.actuators], nu[0] * abs(nu[0]), 1.0)
+        body = damping(nu) - coriolis_matrix(mass, nu) @ nu + REMUS.thruster_wrenches_body @ (actuators * fins)
+        body += mass[:, :3] @ (np.cross(nu[3:], nu[:3]) + rotation.T @ gust)
+        expected = np.concatenate([rotation @ body[:3], body[3:]])
+        expected[:3] += np.array([0.0, 0.0, REMUS.buoyancy_n]) + REMUS.buoyancy_n / 9.81 * gust
+        got, advance = hydrodynamics.wrench(
+            rotation.ravel().tolist(),
+            (rotation @ nu[:3]).tolist(),
+            nu[3:].tolist(),
+            (gust[0], gust[1]),
+            actuators.tolist(),
+        )
+        np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-10)
+        # Advance speed of the stern propeller is u, of the fore lateral (thrust to starboard) −(v + x r).
+        np.testing.assert_allclose(advance[:2], [nu[0], -(nu[1] + 0.35 * nu[5])], atol=1e-12)
+
+
+def test_hull_and_fin_coefficients_add_up_to_presteros_printed_ones() -> None:
+    """At u = 1 m/s the whole model has the thesis's combined derivatives (tolerance 1e-9): nothing counted twice.
+
+    Prestero 2001, combined coefficients: Y_uv −28.6, N_uv −24.0, Z_uw −28.6, M_uw 24.0, Z_uq −5.22, M_uq −2.00,
+    Y_ur 5.22, N_ur −2.00.
+    """
+    printed = {1: {1: -28.6, 5: -24.0}, 2: {2: -28.6, 4: 24.0}, 4: {2: -5.22, 4: -2.0}, 5: {1: 5.22, 5: -2.0}}
+    mass = flip_matrix(REMUS.added_mass_body)
+    for axis, rows in printed.items():
+        step = 1e-7
+        nu = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        nu[axis] = step
+        lift = flip_matrix(REMUS.lift_damping_body) @ nu
+        wrench = lift - coriolis_matrix(mass, nu) @ nu
+        for row, value in rows.items():
+            assert wrench[row] / step == pytest.approx(value, abs=1e-6)
+
+
+def test_coefficients_state_unit_and_source() -> None:
+    groups = (REMUS.added_mass, REMUS.linear_damping, REMUS.quadratic_damping, REMUS.lift_damping)
+    for group in groups:
+        for item in group:
+            assert item.unit
+            assert "verif" not in item.source
+            assert len(item.source) > 10
+
+
+def test_added_mass_does_no_work_and_damping_always_takes() -> None:
+    """νᵀ C_A ν = 0 (1e-9) and νᵀ D-terms < 0 for 50,000 velocities of every direction and ratio."""
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        nu = random_nu(rng)
+        assert abs(nu @ coriolis_matrix(REMUS.added_mass_body, nu) @ nu) < 1e-9
+    nu = rng.standard_normal((50_000, 6)) * 10.0 ** rng.uniform(-3.0, 1.0, (50_000, 6))
+    taken = (
+        np.einsum("ni,ij,nj->n", nu, REMUS.linear_damping_body, nu)
+        + np.einsum("ni,ij,nj->n", nu, REMUS.quadratic_damping_body, np.abs(nu) * nu)
+        + np.abs(nu[:, 0]) * np.einsum("ni,ij,nj->n", nu, REMUS.lift_damping_body, nu)
+    )
+    assert np.all(taken < 0.0)
+
+
+def test_mass_matrices_are_symmetric_positive_definite() -> None:
+    for matrix in (REMUS.rigid_body_mass_body, REMUS.added_mass_body):
+        np.testing.assert_allclose(matrix, matrix.T, atol=1e-12)
+        assert np.linalg.eigvalsh(matrix).min() > 0.0
+
+
+def test_added_mass_rows_turn_with_the_body() -> None:
+    """Kinetic energy of the water is the same in the free joint's coordinates as in body axes (1e-12)."""
+    rng = np.random.default_rng(3)
+    hydrodynamics = Hydrodynamics(trimmed(), ())
+    for _ in range(50):
+        rotation, nu = random_rotation(rng), random_nu(rng)
+        lower = np.zeros((6, 6))
+        lower[np.tril_indices(6)] = hydrodynamics.added_mass_rows(rotation)
+        mass = lower + lower.T - np.diag(np.diag(lower))
+        joint = np.concatenate([rotation @ nu[:3], nu[3:]])
+        assert joint @ mass @ joint == pytest.approx(nu @ REMUS.added_mass_body @ nu, rel=1e-12)
+
+
+def test_mirror_image_gives_the_mirrored_wrench() -> None:
+    """Port and starboard are alike: reflecting (v, p, r) and the lateral actuators reflects (Y, K, N); 1e-12."""
+    rng = np.random.default_rng(4)
+    hydrodynamics = Hydrodynamics(REMUS, (0,))
+    mirror = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    sides = np.array([-1.0 if "lateral" in name or name == "rudder" else 1.0 for name in REMUS.actuator_names])
+    identity = np.eye(3).ravel().tolist()
+    for _ in range(100):
+        nu, actuators = random_nu(rng), rng.uniform(-1.0, 1.0, 7)
+        left = hydrodynamics.wrench(identity, nu[:3].tolist(), nu[3:].tolist(), (0.0, 0.0), actuators.tolist())[0]
+        turned = mirror * nu
+        right = hydrodynamics.wrench(
+            identity, turned[:3].tolist(), turned[3:].tolist(), (0.0, 0.0), (sides * actuators).tolist()
+        )[0]
+        np.testing.assert_allclose(mirror * np.array(left), right, atol=1e-12)
+
+
+def test_lateral_thrusters_hold_a_cross_current_with_margin() -> None:
+    """0.3 m/s across at 0.5 m/s ahead takes at most 1/1.3 of either lateral thruster."""
+    nu = np.array([0.5, -0.3, 0.0, 0.0, 0.0, 0.0])
+    load = flip_twist(damping(nu)) - flip_twist(coriolis_matrix(REMUS.added_mass_body, nu) @ nu)
+    names = REMUS.actuator_names
+    columns = [names.index("fore_lateral"), names.index("aft_lateral")]
+    effect = flip_twist(REMUS.thruster_wrenches_body.T[columns]).T[[1, 5]]
+    needed = np.linalg.solve(effect, -load[[1, 5]])
+    assert np.abs(needed).max() <= 1.0 / 1.3
+    assert np.abs(needed).max() > 0.3
