@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-import mujoco
+import math
+import os
+from typing import Any
+
 import numpy as np
 
 from auvdock.core.arrays import Image
-from auvdock.optics.gl import make_renderer
+from auvdock.optics.gl import offscreen_context
+from auvdock.sim.mj import mujoco
 from auvdock.sim.simulator import Simulator
 
 __all__ = ["ChaseCamera"]
@@ -18,9 +22,11 @@ class ChaseCamera:
     def __init__(self, simulator: Simulator, width_px: int = 640, height_px: int = 360) -> None:
         """Remember what to look at."""
         self._simulator = simulator
-        self._width_px = width_px
-        self._height_px = height_px
-        self._renderer: mujoco.Renderer | None = None
+        self._size = (width_px, height_px)
+        self._process = -1
+        self._gl: Any = None
+        self._context: Any = None
+        self._scene: Any = None
 
     def render(self) -> Image:
         """(H, W, 3) uint8 RGB of the vehicle and what lies before it.
@@ -28,25 +34,53 @@ class ChaseCamera:
         Raises:
             GraphicsError: no OpenGL context can be had.
         """
-        if self._renderer is None:
-            self._renderer = make_renderer(self._simulator.model, self._width_px, self._height_px)
-        truth = self._simulator.truth
+        if self._process != os.getpid():
+            self._open()
+        self._gl.make_current()
+        simulator = self._simulator
+        T_world_body = simulator.truth.T_world_body
+        forward = T_world_body[:3, 0]
         camera = mujoco.MjvCamera()
-        camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-        forward = truth.T_world_body[:3, 0]
-        camera.lookat[:] = truth.T_world_body[:3, 3] + 0.8 * forward
-        camera.azimuth = float(np.degrees(np.arctan2(forward[1], forward[0])))
-        camera.elevation = -20.0
-        camera.distance = 4.0
-        self._renderer.update_scene(self._simulator.data, camera)
-        return self._renderer.render()
+        camera.lookat[:] = T_world_body[:3, 3] + 1.2 * forward
+        camera.azimuth = math.degrees(math.atan2(forward[1], forward[0])) + 25.0
+        camera.elevation = -18.0
+        camera.distance = 4.5
+        # The simulator leaves derived poses stale while nobody looks; draw from the state itself.
+        mujoco.mj_kinematics(simulator.model, simulator.data)
+        category = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(simulator.model, simulator.data, mujoco.MjvOption(), None, camera, category, self._scene)
+        width, height = self._size
+        rect = mujoco.MjrRect(0, 0, width, height)
+        mujoco.mjr_render(rect, self._scene, self._context)
+        image = np.empty((height, width, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(image, None, rect, self._context)
+        return np.ascontiguousarray(image[::-1])
 
     def close(self) -> None:
         """Release the OpenGL context."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        if self._process == os.getpid():
+            self._gl.make_current()
+            self._context.free()
+            self._gl.free()
+        self._gl = self._context = self._scene = None
+        self._process = -1
 
-    def __getstate__(self) -> dict[str, object]:
-        """Everything but the OpenGL context."""
-        return {**self.__dict__, "_renderer": None}
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but OpenGL's state, which lives in one process."""
+        return {"simulator": self._simulator, "size": self._size}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A camera without a context."""
+        self.__init__(state["simulator"], *state["size"])
+
+    def _open(self) -> None:
+        width, height = self._size
+        model = self._simulator.model
+        self._gl = offscreen_context(width, height)
+        self._gl.make_current()
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_resizeOffscreen(width, height, self._context)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        self._scene = mujoco.MjvScene(model, 2 * model.ngeom + 100)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0  # software rendering takes ten times as long with them
+        self._process = os.getpid()

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import cv2
-import mujoco
 import numpy as np
 from rich.console import Console
 from rich.progress import track
@@ -22,6 +21,7 @@ from auvdock.core.errors import GraphicsError
 from auvdock.envs.docking import DockingEnv
 from auvdock.episode.config import EpisodeCfg, level_cfg
 from auvdock.episode.runner import EpisodeRunner
+from auvdock.sim.mj import mujoco
 
 __all__ = ["Bench", "run"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,10 +14,11 @@ import tyro
 
 from auvdock.cli.display import ProgressDisplay, print_result
 from auvdock.cli.parsing import base_config, parse
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, GraphicsError
 from auvdock.episode.config import EpisodeCfg
 from auvdock.episode.runner import EpisodeRunner
 from auvdock.episode.trace import EpisodeObserver
+from auvdock.optics.gl import probe_gl
 
 __all__ = ["DockConical", "run_conical"]
 
@@ -30,8 +32,9 @@ class DockConical:
 
     seed: int = 0
     """Decides start, current, sensor noise and camera noise."""
-    fidelity: Literal["pixels", "beacons"] | None = None
-    """pixels renders every frame; beacons draws detections from the same light model without an image."""
+    fidelity: Literal["pixels", "beacons", "auto"] | None = None
+    """pixels renders every frame; beacons draws detections from the same light model without an image; auto is pixels
+    where OpenGL works, else beacons."""
     detector: str | None = None
     """threshold, blob, or your own as package.module:Name."""
     water: str | None = None
@@ -61,7 +64,7 @@ class DockConical:
         changes: dict[str, Any] = {}
         world: dict[str, Any] = changes.setdefault("world", {})
         if self.fidelity is not None:
-            world["fidelity"] = self.fidelity
+            world["fidelity"] = _working_fidelity() if self.fidelity == "auto" else self.fidelity
         if self.water is not None:
             world["water"] = self.water
         if self.attenuation is not None:
@@ -100,6 +103,15 @@ def run_conical(argv: Sequence[str], prog: str) -> int:
     else:
         print_result(result, args.record)
     return 0 if result.success else 1
+
+
+def _working_fidelity() -> str:
+    try:
+        probe_gl()
+    except GraphicsError as error:
+        print(f"auvdock: {error}", file=sys.stderr)
+        return "beacons"
+    return "pixels"
 
 
 def _finite(name: str, value: float, remedy: str) -> float:

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 
 import cv2
-import mujoco
 import numpy as np
 
 from auvdock.controllers.pilot import ConicalPilot
@@ -21,6 +20,7 @@ from auvdock.episode.result import EpisodeResult
 from auvdock.episode.trace import EpisodeObserver, EpisodeSetup, Tick
 from auvdock.perception.detectors import make_detector
 from auvdock.perception.pipeline import BeaconPerception
+from auvdock.sim.mj import mujoco
 
 __all__ = ["EpisodeRunner", "software_versions"]
 

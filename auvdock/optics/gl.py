@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -13,7 +14,7 @@ from auvdock.core.arrays import Array, Image
 from auvdock.core.errors import GraphicsError
 from auvdock.sim.mj import MjModel, mujoco
 
-__all__ = ["StaticRenderer"]
+__all__ = ["StaticRenderer", "offscreen_context", "probe_gl"]
 
 _NEAR_M, _FAR_M = 0.05, 80.0
 _REMEDY = (
@@ -98,12 +99,15 @@ class StaticRenderer:
         quality = model.vis.quality
         kept = quality.offsamples, quality.shadowsize
         try:
-            self._gl = _gl_context(width, height)
+            self._gl = offscreen_context(width, height)
             self._gl.make_current()
             quality.offsamples, quality.shadowsize = 0, 0
             self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
             mujoco.mjr_resizeOffscreen(width, height, self._context)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        except GraphicsError:
+            self._drop()
+            raise
         except Exception as error:
             self._drop()
             raise GraphicsError(f"no OpenGL context for rendering ({error}); {_REMEDY}") from error
@@ -127,17 +131,35 @@ class StaticRenderer:
         self._process = os.getpid()
 
 
-def _gl_context(width: int, height: int) -> Any:  # noqa: ANN401
-    """MuJoCo's own choice of context; without MUJOCO_GL and without a display, EGL and then OSMesa."""
-    try:
-        return mujoco.GLContext(width, height)
-    except Exception:
-        if os.environ.get("MUJOCO_GL"):
-            raise
-    failure: Exception | None = None
-    for name in ("egl", "osmesa"):
+def offscreen_context(width_px: int, height_px: int) -> Any:  # noqa: ANN401
+    """An OpenGL context without a window: MUJOCO_GL's choice, else EGL, OSMesa or, on a desktop, GLFW.
+
+    Raises:
+        GraphicsError: none can be had; the message says what to install.
+    """
+    chosen = os.environ.get("MUJOCO_GL", "")
+    desktop = sys.platform != "linux" or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
+    makers = ["mujoco"] if chosen or desktop else []
+    makers += [] if chosen else ["mujoco.egl", "mujoco.osmesa"]
+    failures: list[str] = []
+    for maker in makers:
         try:
-            return import_module(f"mujoco.{name}").GLContext(width, height)
-        except Exception as error:
-            failure = error
-    raise RuntimeError(str(failure))
+            return import_module(maker).GLContext(width_px, height_px)
+        except Exception as error:  # drivers fail in many ways: ImportError, AttributeError, RuntimeError, GLError
+            failures.append(f"{maker.removeprefix('mujoco.')}: {str(error).splitlines()[0] if str(error) else error!r}")
+    raise GraphicsError(f"no OpenGL context for rendering ({'; '.join(failures)}); {_REMEDY}")
+
+
+def probe_gl() -> str:
+    """Make a context, ask it for its renderer's name, and free it.
+
+    Raises:
+        GraphicsError: no OpenGL context can be had.
+    """
+    context = offscreen_context(16, 16)
+    try:
+        context.make_current()
+        name = import_module("OpenGL.GL").glGetString(import_module("OpenGL.GL").GL_RENDERER)
+        return name.decode() if isinstance(name, bytes) else type(context).__module__
+    finally:
+        context.free()
