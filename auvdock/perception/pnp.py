@@ -4,7 +4,7 @@ Paper A, section 4.3. With n ≥ 5 lights SQPnP (Terzakis & Lourakis 2020; our r
 quadratic programming"), with 3 or 4 the iterative solver; both end in Levenberg–Marquardt on the reprojection error in
 pixels, lens distortion included. A frame that follows on a solved one starts that refinement from the last pose. Lights
 of a plane have two poses that reproject almost equally well (Schweighofer & Pinz 2006): the vehicle's own attitude
-decides between them.
+decides between them, and enters the least squares as a weak prior (beyond the paper; can be switched off).
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ __all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "translation_from_rotation"]
 
 _potrf, _potrs = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 _MAX_ITERATIONS = 20
-_DECREMENT = 1e-6
+_DECREMENT = 1e-9
+_DECREMENT_TRACKED = 1e-4
 _IDENTITY = np.eye(6)
 
 
@@ -40,9 +41,10 @@ class PnpCfg:
     """Trust in the vehicle's own attitude when it decides between the two poses of a plane."""
     max_attitude_error_deg: float = 40.0
     """A pose turned farther than this from the vehicle's own attitude is refused."""
-    attitude_prior_sigma_deg: float = 0.0
-    """Above 0 the vehicle's attitude enters the least squares itself with this σ per axis; 0 leaves the pose to light
-    alone, as in paper A."""
+    attitude_prior_sigma_deg: float = 5.0
+    """The vehicle's attitude enters the least squares with this σ per axis; 0 leaves the pose to light alone, as in
+    paper A. Beyond some 8 m light alone hardly tells how the array is turned, and the two poses of its plane melt into
+    one that may be 30° off and carries the position with it."""
 
     def __post_init__(self) -> None:
         """Refuse what no check can use."""
@@ -61,10 +63,10 @@ class PnpSolution:
         rotation_vector: (3,) Rodrigues vector of R.
         rotation: (3, 3) R.
         translation_m: (3,) t.
-        residual_px: (n,) distance between each observed light and its reprojection.
-        normal: (6, 6) lower Cholesky factor of JᵀWJ over (rotation vector, t).
+        residual_px: (n,) distance between each observed light and its reprojection, to a hundredth of its σ.
+        normal: (6, 6) lower Cholesky factor of JᵀWJ over (rotation vector, t), prior included.
         attitude_error_rad: angle to the attitude prior.
-        cost: χ² of the reprojection.
+        cost: χ² of the reprojection and of the attitude prior, if that is in use.
         solver: name of the solver.
     """
 
@@ -200,9 +202,9 @@ class PnpSolver:
     ) -> PnpSolution | None:
         """Levenberg–Marquardt on the weighted reprojection error."""
         if isinstance(start, PnpSolution):
-            pose = np.concatenate([start.rotation_vector, start.translation_m])
+            pose, decrement = np.concatenate([start.rotation_vector, start.translation_m]), _DECREMENT_TRACKED
         else:
-            pose = np.concatenate(start)
+            pose, decrement = np.concatenate(start), _DECREMENT
         weight = np.repeat(1.0 / sigma, 2)
         target = np.ascontiguousarray(pixels).reshape(-1)
         prior_vector, prior_matrix = self._prior_terms(prior) if self._prior_weight else (np.zeros(3), np.zeros((3, 3)))
@@ -234,8 +236,8 @@ class PnpSolver:
                 continue
             step, _ = _potrs(factor, gradient, lower=1)
             trial = pose - step
-            # The expected fall of χ²: below this the step is a thousandth of the pose's standard deviation.
-            if float(gradient @ step) < _DECREMENT and damping <= 1e-9:
+            # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
+            if float(gradient @ step) < decrement and damping <= 1e-9:
                 pose = trial
                 break
         factor, info = _potrf(normal, lower=1)

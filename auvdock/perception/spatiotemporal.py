@@ -155,14 +155,16 @@ class SpatiotemporalAssociation:
         for identity in self._authenticator.propose(self._camera.normalise(pixels), prior):
             settled = self._settle(pixels, identity, prior)
             if settled is not None:
-                found = np.flatnonzero(settled >= 0)
+                identity, self._last = settled
+                self._age = 0
+                found = np.flatnonzero(identity >= 0)
                 tracks.beacon_id[:] = -1
-                tracks.beacon_id[chosen[settled[found]]] = found
+                tracks.beacon_id[chosen[identity[found]]] = found
                 return True
         return False
 
-    def _settle(self, pixels: Array, identity: IntArray, prior: Array) -> IntArray | None:
-        """Solve, look again where all beacons must be, and solve again: the identities, or None if they do not hold."""
+    def _settle(self, pixels: Array, identity: IntArray, prior: Array) -> tuple[IntArray, PnpSolution] | None:
+        """Solve, look again where all beacons must be, and solve again; None if the identities do not hold."""
         for _ in range(2):
             beacons = np.flatnonzero(identity >= 0)
             if len(beacons) < self._cfg.min_beacons:
@@ -178,7 +180,7 @@ class SpatiotemporalAssociation:
             error = float(solution.residual_px.mean())
             again = self._match(solution, pixels)
             if np.array_equal(again, identity):
-                return identity if error <= self._pnp.max_reprojection_px else None
+                return (identity, solution) if error <= self._pnp.max_reprojection_px else None
             identity = again
         return None
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.camera import Camera, CameraCfg, make_camera
-from auvdock.core.contracts import BLUE, Detections, Proprioception
+from auvdock.core.contracts import BLUE, Detections, Percept, Proprioception
 from auvdock.core.station import load_conical_station
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 
@@ -44,8 +44,9 @@ def pixels_of(T_station_camera: Array, points_m: Array) -> Array:
 
 
 def all_in_view(T_station_camera: Array, points_m: Array) -> bool:
-    """Whether the camera sees every point."""
-    return bool(CAMERA.in_view((points_m - T_station_camera[:3, 3]) @ T_station_camera[:3, :3]).all())
+    """Whether every point falls on the sensor; for points less than 55° off the optical axis."""
+    pixels = pixels_of(T_station_camera, points_m)
+    return bool(pixels.min() >= 0.0 and pixels[:, 0].max() < CAMERA.width_px and pixels[:, 1].max() < CAMERA.height_px)
 
 
 def random_motion(rng: np.random.Generator, points_m: Array, duration_s: float = 0.5) -> Motion:
@@ -72,8 +73,10 @@ def random_motion(rng: np.random.Generator, points_m: Array, duration_s: float =
             return motion
 
 
-def proprioception(rng: np.random.Generator, euler: Array, time_s: float = 0.0, bias_rad: Array | None = None):
-    """Inclinometer 0.5°, compass 2°, as a constant error plus a little noise."""
+def proprioception(
+    rng: np.random.Generator, euler: Array, time_s: float = 0.0, bias_rad: Array | None = None
+) -> Proprioception:
+    """The vehicle's own sensors: a constant attitude error plus 0.1° of noise."""
     bias = np.zeros(3) if bias_rad is None else bias_rad
     measured = euler + bias + rng.normal(0.0, math.radians(0.1), 3)
     zero = np.zeros(3)
@@ -95,7 +98,7 @@ def blue_detections(
     return Detections.from_points(centres, scores, np.full(len(order), BLUE, dtype=np.int64)), order
 
 
-def labels_by_detection(percept, detections: Detections) -> dict[int, int]:
+def labels_by_detection(percept: Percept, detections: Detections) -> dict[int, int]:
     """{row of the detection: beacon id} of the tracks that were seen in this frame."""
     named: dict[int, int] = {}
     for track in percept.tracks:

@@ -1,0 +1,194 @@
+"""Authentication on 10,000 synthetic scenes, in seeded chunks.
+
+A scene is an approach in the mid range: 2.5 to 12 m, up to 20° off the axis, roll within ±20°, every light in view,
+0.3 to 0.7 m/s with up to 4 °/s of turning; detections with 0.5 px of noise in shuffled order; inclinometer wrong by 0.5°
+and compass by 2° (standard deviations, constant in a scene). In every other scene the far lamp, a seventh blue light,
+is seen above the ring. Right means: every beacon detected in the last frame carries its own identity, and no other
+light carries any.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from perception_scenes import (
+    ARRAY,
+    CAMERA,
+    FAR,
+    LAYOUT,
+    Motion,
+    attitude_bias,
+    blue_detections,
+    labels_by_detection,
+    pixels_of,
+    proprioception,
+    random_motion,
+)
+
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.contracts import Percept
+from auvdock.core.errors import ConfigError
+from auvdock.perception.authentication import AuthenticationCfg, symmetric_pairs
+from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
+
+CHUNK = 2500
+CHUNKS = 4
+RING = LAYOUT.positions_m[ARRAY]
+RING_AND_FAR = LAYOUT.positions_m[[*ARRAY, FAR]]
+SPURIOUS = 99
+
+
+def spurious_lights(rng: np.random.Generator, lights_px: Array, count: int) -> Array:
+    """Positions anywhere in the image, 6 px or more from the station's lights (nearer ones would merge)."""
+    found: list[Array] = []
+    while len(found) < count:
+        place = rng.uniform([0.0, 0.0], [CAMERA.width_px, CAMERA.height_px])
+        if np.linalg.norm(lights_px - place, axis=1).min() > 6.0:
+            found.append(place)
+    return np.array(found).reshape(-1, 2)
+
+
+class Scene:
+    """One approach, frame by frame."""
+
+    def __init__(self, rng: np.random.Generator, with_far: bool, spurious: int) -> None:
+        self.rng = rng
+        self.points = RING_AND_FAR if with_far else RING
+        self.motion: Motion = random_motion(rng, self.points)
+        self.bias = attitude_bias(rng)
+        self.stray = spurious_lights(rng, pixels_of(self.motion.at(0.0)[0], self.points), spurious)
+        self.drift = rng.uniform(-10.0, 10.0, (spurious, 2))
+        self.identity: IntArray = np.concatenate([np.arange(len(self.points)), np.full(spurious, SPURIOUS)])
+        self.frame = 0
+
+    def show(self, perception: BeaconPerception, hidden: frozenset[int] = frozenset()) -> tuple[bool, bool, Percept]:
+        """Process the next frame: (all identities right, any identity wrong, percept)."""
+        time_s = self.frame / 30.0
+        self.frame += 1
+        T_station_camera, euler = self.motion.at(time_s)
+        centres = np.vstack([pixels_of(T_station_camera, self.points), self.stray + self.drift * time_s])
+        visible = np.array([index for index, name in enumerate(self.identity.tolist()) if name not in hidden])
+        detections, order = blue_detections(self.rng, centres[visible])
+        percept = perception.update(detections, proprioception(self.rng, euler, time_s, self.bias))
+        truth = self.identity[visible][order].tolist()
+        named = labels_by_detection(percept, detections)
+        wanted = {row: name for row, name in enumerate(truth) if name < len(ARRAY)}
+        wrong = any(wanted.get(row) != name for row, name in named.items())
+        return named == wanted, wrong, percept
+
+
+@pytest.mark.parametrize("chunk", range(CHUNKS))
+def test_all_lights_then_three_of_six_missing(chunk: int):
+    """10,000 scenes: right in ≥ 99.9 % after 4 frames with all lights, in ≥ 99 % 3 frames after losing 3 of 6.
+
+    Published for a comparable array with 3 missing: 90.3 %. A wrong identity behind a pose: < 0.1 %. Held per chunk of
+    2,500.
+    """
+    rng = np.random.default_rng([20240, chunk])
+    perception = BeaconPerception(PerceptionCfg(), CAMERA, LAYOUT)
+    right = right_missing = surviving = 0
+    for index in range(CHUNK):
+        scene = Scene(rng, with_far=index % 2 == 1, spurious=0)
+        perception.reset()
+        good, wrong, percept = False, False, None
+        for _ in range(4):
+            good, wrong, percept = scene.show(perception)
+        assert percept is not None
+        right += good and percept.pose is not None and percept.pose.measured
+        surviving += wrong and percept.pose is not None
+        hidden = frozenset(rng.permutation(6)[:3].tolist())
+        for _ in range(3):
+            good, wrong, percept = scene.show(perception, hidden)
+        right_missing += good and percept.pose is not None and percept.pose.measured
+        surviving += wrong and percept.pose is not None
+    assert right >= 0.999 * CHUNK
+    assert right_missing >= 0.99 * CHUNK
+    assert surviving < 0.001 * CHUNK
+
+
+@pytest.mark.parametrize("chunk", range(CHUNKS))
+def test_two_spurious_lights(chunk: int):
+    """10,000 scenes with 2 lasting spurious lights: right in ≥ 99.9 % after 4 frames (published: 99.6 %).
+
+    A wrong identity behind a pose: < 0.1 %. Held per chunk of 2,500.
+    """
+    rng = np.random.default_rng([20241, chunk])
+    perception = BeaconPerception(PerceptionCfg(), CAMERA, LAYOUT)
+    right = surviving = 0
+    for index in range(CHUNK):
+        scene = Scene(rng, with_far=index % 2 == 1, spurious=2)
+        perception.reset()
+        good, wrong, percept = False, False, None
+        for _ in range(4):
+            good, wrong, percept = scene.show(perception)
+        assert percept is not None
+        right += good and percept.pose is not None and percept.pose.measured
+        surviving += wrong and percept.pose is not None
+    assert right >= 0.999 * CHUNK
+    assert surviving < 0.001 * CHUNK
+
+
+def test_three_lights_last_beyond_the_prediction():
+    """100 scenes, 3 of 6 hidden for 14 frames, longer than any prediction: identities and measured pose hold in 99."""
+    rng = np.random.default_rng(20242)
+    perception = BeaconPerception(PerceptionCfg(), CAMERA, LAYOUT)
+    right = 0
+    for _ in range(100):
+        scene = Scene(rng, with_far=True, spurious=0)
+        perception.reset()
+        for _ in range(4):
+            scene.show(perception)
+        hidden = frozenset(rng.permutation(6)[:3].tolist())
+        good, percept = False, None
+        for _ in range(14):
+            good, _, percept = scene.show(perception, hidden)
+        assert percept is not None
+        right += good and percept.pose is not None and percept.pose.measured
+    assert right >= 99
+
+
+def test_first_sight_with_a_beacon_missing():
+    """300 scenes in which one beacon is never seen, with the far lamp and a spurious light: right in ≥ 99 %."""
+    rng = np.random.default_rng(20243)
+    perception = BeaconPerception(PerceptionCfg(), CAMERA, LAYOUT)
+    right = 0
+    for _ in range(300):
+        scene = Scene(rng, with_far=True, spurious=1)
+        perception.reset()
+        hidden = frozenset([int(rng.integers(6))])
+        good = False
+        for _ in range(4):
+            good, _, _ = scene.show(perception, hidden)
+        right += good
+    assert right >= 297
+
+
+def test_wrong_compass_is_forgiven():
+    """300 scenes with the compass 8° off (4 σ): identities right in ≥ 99 %."""
+    rng = np.random.default_rng(20244)
+    perception = BeaconPerception(PerceptionCfg(), CAMERA, LAYOUT)
+    right = 0
+    for _ in range(300):
+        scene = Scene(rng, with_far=True, spurious=1)
+        scene.bias = np.radians([0.5, 0.5, 8.0 * rng.choice([-1.0, 1.0])])
+        perception.reset()
+        good = False
+        for _ in range(4):
+            good, _, _ = scene.show(perception)
+        right += good
+    assert right >= 297
+
+
+def test_opposite_pairs_of_the_ring():
+    """Paper A's opposite pairs are (0, 3), (1, 4), (2, 5); an array without any gets all pairs."""
+    assert symmetric_pairs(RING).tolist() == [[0, 3], [1, 4], [2, 5]]
+    assert len(symmetric_pairs(RING[:5])) == 10
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("min_beacons", 3), ("max_angle_deg", 0.0), ("min_confidence", 1.5), ("min_occurrences", 0), ("tolerance", 0.0)],
+)
+def test_bad_setting_is_refused(field: str, value: float):
+    with pytest.raises(ConfigError, match=field):
+        AuthenticationCfg(**{field: value})
