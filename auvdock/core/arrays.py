@@ -15,6 +15,8 @@ Image = NDArray[np.uint8]
 
 def check_shape(name: str, array: NDArray[np.generic], shape: tuple[int | None, ...]) -> None:
     """Raise ValueError unless `array` has `shape`; None stands for any length."""
+    if array.shape == shape:
+        return  # the common case, at a tenth of the cost
     if array.ndim != len(shape) or any(
         want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
     ):
