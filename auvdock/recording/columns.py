@@ -123,8 +123,8 @@ class ColumnWriter:
     def _write_modes(self, batch: _Batch, rows: Sequence[Row]) -> None:
         modes = [row.tick.command.mode for row in rows]
         batch.scalars(paths.MODE_NUMBER, np.array([self._modes.number(mode) for mode in modes], dtype=np.float64))
-        ranges_m = _ranges(rows)
-        followed = (self._modes.follow(index, mode, float(ranges_m[index])) for index, mode in enumerate(modes))
+        ahead_m = [float(row.tick.truth.nose_station_m[0]) for row in rows]
+        followed = (self._modes.follow(index, mode, ahead_m[index]) for index, mode in enumerate(modes))
         changes = [change for change in followed if change is not None]
         if changes:
             at = batch.select(np.array([change.row for change in changes]))

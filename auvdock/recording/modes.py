@@ -49,11 +49,17 @@ class ModeFollower:
         """The mode's number; a mode never seen before gets the next free one."""
         return self._numbers.setdefault(mode, len(self._numbers))
 
-    def follow(self, row: int, mode: str, range_m: float) -> ModeChange | None:
-        """The change if `mode` is another than in the tick before, else None."""
+    def follow(self, row: int, mode: str, ahead_m: float) -> ModeChange | None:
+        """The change if `mode` is another than in the tick before, else None.
+
+        Args:
+            row: index of the tick within its batch.
+            mode: the tick's mode.
+            ahead_m: how far the nose is in front of the mouth along the station's axis; negative inside.
+        """
         if mode == self._current:
             return None
-        where = f"{range_m:.1f} m from the mouth"
+        where = f"{abs(ahead_m):.1f} m {'in front of' if ahead_m >= 0.0 else 'past'} the mouth"
         text = f"{mode}, {where}" if self._current is None else f"{self._current} → {mode}, {where}"
         self._current = mode
         return ModeChange(row, mode, text)
