@@ -115,8 +115,9 @@ def test_modes_are_numbered_and_only_changes_are_told() -> None:
     assert own == len(KNOWN_MODES)
     assert follower.number("other") == own + 1
     assert follower.number("spiral") == own
-    changes = [follower.follow(row, mode, 2.0 - row) for row, mode in enumerate(["far", "far", "mid", "mid", "far"])]
-    assert [change.row for change in changes if change] == [0, 2, 4]
-    assert [change.mode for change in changes if change] == ["far", "mid", "far"]
-    assert "2.0 m in front of" in changes[0].text if changes[0] else False
-    assert "2.0 m past" in changes[4].text if changes[4] else False
+    told = (follower.follow(row, mode, 2.0 - row) for row, mode in enumerate(["far", "far", "mid", "mid", "far"]))
+    changes = [change for change in told if change is not None]
+    assert [change.row for change in changes] == [0, 2, 4]
+    assert [change.mode for change in changes] == ["far", "mid", "far"]
+    assert "2.0 m in front of" in changes[0].text
+    assert "2.0 m past" in changes[2].text
