@@ -1,1 +1,1 @@
-"""auvdock.perception."""
+"""Pixels to pose: detectors, tracks, identities, PnP, bearings."""

@@ -1,13 +1,15 @@
 """Authentication on 10,000 synthetic scenes, in seeded chunks.
 
 A scene is an approach in the mid range: 2.5 to 12 m, up to 20° off the axis, roll within ±20°, every light in view,
-0.3 to 0.7 m/s with up to 4 °/s of turning; detections with 0.5 px of noise in shuffled order; inclinometer wrong by 0.5°
-and compass by 2° (standard deviations, constant in a scene). In every other scene the far lamp, a seventh blue light,
-is seen above the ring. Right means: every beacon detected in the last frame carries its own identity, and no other
-light carries any.
+0.3 to 0.7 m/s with up to 4 °/s of turning; detections with 0.5 px of noise in shuffled order; inclinometer wrong by
+0.5° and compass by 2° (standard deviations, constant in a scene). In every other scene the far lamp, a seventh blue
+light, is seen above the ring. Right means: every beacon detected in the last frame carries its own identity, and no
+other light carries any.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -189,6 +191,6 @@ def test_opposite_pairs_of_the_ring():
     ("field", "value"),
     [("min_beacons", 3), ("max_angle_deg", 0.0), ("min_confidence", 1.5), ("min_occurrences", 0), ("tolerance", 0.0)],
 )
-def test_bad_setting_is_refused(field: str, value: float):
+def test_bad_setting_is_refused(field: str, value: Any):
     with pytest.raises(ConfigError, match=field):
         AuthenticationCfg(**{field: value})

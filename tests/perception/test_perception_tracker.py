@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from filterpy.common import Q_discrete_white_noise
@@ -31,8 +33,8 @@ def test_equals_filterpy_kalman_filter():
     cfg = TrackerCfg(gate_sigmas=50.0)
     rng = np.random.default_rng(1)
     mine = tracker(cfg)
-    q = Q_discrete_white_noise(2, DT, cfg.acceleration_px_s2**2)
-    reference: list[KalmanFilter] = []
+    q = np.asarray(Q_discrete_white_noise(2, DT, cfg.acceleration_px_s2**2), dtype=np.float64)
+    reference: list[Any] = []
     starts = np.array([[100.0, 80.0], [500.0, 300.0]])
     for frame in range(40):
         score = float(rng.uniform(0.2, 1.0))
@@ -42,7 +44,7 @@ def test_equals_filterpy_kalman_filter():
         noise = cfg.pixel_sigma_px**2 / (score + 0.1)
         for index in range(2):
             if frame == 0:
-                kf = KalmanFilter(dim_x=4, dim_z=2)
+                kf: Any = KalmanFilter(dim_x=4, dim_z=2)
                 kf.F = np.kron(np.array([[1.0, DT], [0.0, 1.0]]), np.eye(2))
                 kf.H = np.hstack([np.eye(2), np.zeros((2, 2))])
                 kf.Q = np.kron(q, np.eye(2))
