@@ -64,7 +64,7 @@ class Actuators:
     def power_w(self, advance_m_s: Sequence[float]) -> float:
         """Hydraulic power of the thrusters at the given advance speeds (one per thruster, along its thrust axis).
 
-        Actuator-disc theory (Rankine-Froude; Carlton 2018, section 8.2): P = ½ |T| (V + √(V² + 2 |T| / (ρ A))) with V
+        Actuator-disc theory (Rankine and Froude): P = ½ |T| (V + √(V² + 2 |T| / (ρ A))) with V
         the advance speed in the direction of the thrust; so a hovering thruster costs power too.
         """
         power = 0.0

@@ -25,7 +25,7 @@ class Hydrodynamics:
     """The water's forces on one vehicle.
 
     With the body's acceleration ν̇ over ground, the accelerating water's u̇_c and v_r = v − Rᵀ u_c, Fossen (2011,
-    equations 6.43, 6.53 and 8.145) reads, for the free joint's coordinates (a, ω̇) with a = R (v̇ + ω × v):
+    chapters 6 and 8) reads, for the free joint's coordinates (a, ω̇) with a = R (v̇ + ω × v):
 
         (M_RB + M_A) ν̇ + … = −C_A(ν_r) ν_r + M_A (ω × v_r + Rᵀ u̇_c, 0) + m_d Rᵀ u̇_c + D-terms + actuators
 

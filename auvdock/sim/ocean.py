@@ -45,7 +45,7 @@ class CurrentCfg:
 class Ocean:
     """The water's velocity at the vehicle.
 
-    Gusts are a first-order Gauss-Markov process, T ġ + g = white noise (Fossen 2011, equation 8.128), uniform in space
+    Gusts are a first-order Gauss-Markov process, T ġ + g = white noise (Fossen 2011, section 8.3), uniform in space
     and discretised exactly: g[k+1] = e^(−dt/T) g[k] + σ √(1 − e^(−2 dt/T)) n[k].
     """
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from auvdock.core.arrays import Array
@@ -26,6 +24,8 @@ _CONTACT_TIME_S = 0.03
 """Time constant of contacts: over three physics steps at 120 Hz (MuJoCo asks for two), a polymer lining's give."""
 _LATCH_TIME_S = 0.1
 """Time constant of the latch's hold: stops 0.5 m/s within some 5 cm, as a sprung pawl does."""
+_CAMERA_FOVY_DEG = 50.0
+"""Of the named cameras, which are for looking at the scene; perception's camera brings its own intrinsics."""
 _FIN_SPAN_M = 0.055
 _FIN_CHORD_M = 0.075
 
@@ -50,8 +50,8 @@ def build_model(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) ->
 def scene_xml(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) -> str:
     """MJCF of the scene; every element is named.
 
-    Dense Jacobian and Newton solver for this small model; islands are off because they would copy the mass matrix
-    before the added mass is in it; automatic reset is off because a diverged state must be seen.
+    Dense Jacobian and Newton solver for this small model, whose single body needs no islands; automatic reset is off
+    because a diverged state must be seen.
     """
     geoms = "\n      ".join(station_geoms(station))
     depth = station.depth_m
@@ -145,4 +145,4 @@ def _camera(name: str, mount: MountCfg) -> str:
     right = np.cross(forward, up)
     pos = " ".join(f"{part:.9g}" for part in flip_vector(np.array(mount.position_m)))
     axes = " ".join(f"{part:.9g}" for part in (*right, *up))
-    return f'<camera name="{name}" pos="{pos}" xyaxes="{axes}" fovy="{math.radians(50.0):.9g}"/>'
+    return f'<camera name="{name}" pos="{pos}" xyaxes="{axes}" fovy="{_CAMERA_FOVY_DEG}"/>'
