@@ -13,6 +13,7 @@ ORDER = (
     "sim",
     "optics",
     "perception",
+    "planning",
     "controllers",
     "envs",
     "episode",

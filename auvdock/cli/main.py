@@ -13,6 +13,10 @@ __all__ = ["COMMANDS", "main"]
 COMMANDS = {
     ("dock", "conical"): ("auvdock.cli.dock:run_conical", "dock into the conical station, one episode"),
     ("view",): ("auvdock.cli.view:run", "open a recording in the Rerun viewer"),
+    ("reproduce", "guidance-space"): (
+        "auvdock.cli.reproduce:run_guidance_space",
+        "paper A's guidance-space tables beside ours",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),

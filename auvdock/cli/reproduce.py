@@ -1,0 +1,107 @@
+"""`auvdock reproduce NAME`: a published table beside ours."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from auvdock.cli.parsing import parse
+from auvdock.core.errors import ConfigError
+from auvdock.experiments.guidance_space import (
+    CELLS,
+    TOLERANCE_M3,
+    CellResult,
+    ReadingResult,
+    reproduce,
+    task_count,
+)
+
+__all__ = ["GuidanceSpace", "run_guidance_space"]
+
+
+@dataclass(frozen=True)
+class GuidanceSpace:
+    """Paper A's tables 4 and 5 (size of the precise-guidance space) beside ours.
+
+    Exit code: 0 if every cell agrees within 0.1 m³, 1 if not.
+    """
+
+    json: bool = False
+    """Print one JSON object and nothing else."""
+    workers: int | None = None
+    """Processes; by default one per core."""
+
+
+def run_guidance_space(argv: Sequence[str], prog: str) -> int:
+    """Run the command."""
+    args = parse(GuidanceSpace, argv, prog)
+    if args.workers is not None and args.workers < 1:
+        raise ConfigError("workers", args.workers, "1 or more")
+    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("cells and readings", total=task_count())
+        report = reproduce(lambda: progress.advance(task), args.workers)
+    if args.json:
+        print(json.dumps(_plain(report.cells, report.readings, report.within), allow_nan=False))
+    else:
+        _print(report.cells, report.readings, report.within)
+    return 0 if report.within == len(CELLS) else 1
+
+
+def _plain(cells: Sequence[CellResult], readings: Sequence[ReadingResult], within: int) -> dict[str, Any]:
+    rows: list[dict[str, Any]] = []
+    for result in cells:
+        row = asdict(result)
+        cell = row.pop("cell")
+        rows.append({**cell, **row})
+    return {
+        "tolerance_m3": TOLERANCE_M3,
+        "cells": rows,
+        "cells_within": within,
+        "cells_total": len(cells),
+        "max_difference_m3": max(abs(result.difference_m3) for result in cells),
+        "readings": [asdict(reading) for reading in readings],
+    }
+
+
+def _print(cells: Sequence[CellResult], readings: Sequence[ReadingResult], within: int) -> None:
+    console = Console()
+    for number, title in ((4, "table 4: lights and beam angle"), (5, "table 5: six lights of 45°, inward tilt")):
+        table = Table(title=f"paper A, {title}; volumes in m³", title_justify="left")
+        for name in ("angle °", "lights", "tilt °", "paper", "ours", "difference", "fine hull", "converged", "voxels"):
+            table.add_column(name, justify="right")
+        for result in cells:
+            cell = result.cell
+            if cell.table == number:
+                figures = (result.ours_m3, result.difference_m3, result.fine_hull_m3, result.converged_hull_m3)
+                table.add_row(
+                    f"{cell.angle_deg:g}",
+                    str(cell.count),
+                    f"{cell.inward_tilt_deg:+g}",
+                    f"{cell.paper_m3:.1f}",
+                    f"{figures[0]:.2f}",
+                    f"{figures[1]:+.3f}",
+                    *(f"{value:.1f}" for value in (*figures[2:], result.fine_voxel_m3)),
+                )
+        console.print(table)
+    table = Table(title="what other readings of the paper would have given", title_justify="left")
+    for name in ("reading", "table 4 rms", "table 5 rms", "greatest m³", "cells within", "best tilt", "gain"):
+        table.add_column(name, justify="left" if name == "reading" else "right")
+    for reading in readings:
+        table.add_row(
+            reading.name,
+            f"{reading.table_4_rms:.4f}",
+            f"{reading.table_5_rms:.4f}",
+            f"{reading.max_difference_m3:.2f}",
+            f"{reading.cells_within}/{len(cells)}",
+            f"{reading.best_tilt_deg:+g}°",
+            f"{reading.gain:.3f}",
+        )
+    console.print(table)
+    console.print(f"{within} of {len(cells)} cells within {TOLERANCE_M3:g} m³ of the paper's")
