@@ -1,5 +1,14 @@
-"""auvdock: closed-loop camera docking of autonomous underwater vehicles in MuJoCo."""
+"""auvdock: closed-loop camera docking of autonomous underwater vehicles in MuJoCo.
+
+Importing it registers the environments, so that `gymnasium.make("auvdock/ConicalDocking-v0")` finds them.
+"""
 
 from importlib.metadata import version
 
+from auvdock.envs.registration import register_envs
+
+__all__ = ["__version__"]
+
 __version__ = version("auvdock")
+
+register_envs()

@@ -23,7 +23,9 @@ The limits in newtons and radians stand in `assets/vehicles/remus_hybrid.toml`.
 ## Observation space
 Chosen by `observation`:
 
-`"state"` (default): `Box(-inf, inf, (19,), float64)`, the true state. Privileged: no real vehicle has it.
+All boxes are float64 and bounded by ±1000, which nothing reaches before the episode ends as `diverged`.
+
+`"state"` (default): `Box` of shape (19,), the true state. Privileged: no real vehicle has it.
 
 | Num | Observation | Unit |
 |---|---|---|
@@ -88,6 +90,8 @@ from auvdock.sim.truth import Truth
 __all__ = ["OBSERVATIONS", "DockingEnv"]
 
 OBSERVATIONS = ("state", "pose", "image")
+BOUND = 1000.0
+"""Bound of every observed number, in its own unit."""
 
 Observation = Array | dict[str, Any]
 
@@ -237,7 +241,7 @@ class DockingEnv(gymnasium.Env[Any, Any]):
 
     def _make_observation_space(self) -> spaces.Space[Any]:
         def box(*shape: int) -> spaces.Box:
-            return spaces.Box(-np.inf, np.inf, shape, np.float64)
+            return spaces.Box(-BOUND, BOUND, shape, np.float64)
 
         if self.observation == "state":
             return box(19)
@@ -271,7 +275,7 @@ class DockingEnv(gymnasium.Env[Any, Any]):
     def _state(self, truth: Truth) -> Array:
         R_station_world = self._world.simulator.T_world_station[:3, :3].T
         rotation = R_station_world @ truth.T_world_body[:3, :3]
-        return np.concatenate(
+        state = np.concatenate(
             [
                 truth.nose_station_m,
                 rotation[:, 0],
@@ -281,6 +285,7 @@ class DockingEnv(gymnasium.Env[Any, Any]):
                 [float(truth.touching_station)],
             ]
         )
+        return np.clip(np.nan_to_num(state, nan=BOUND), -BOUND, BOUND)  # a diverged state must stay in its space
 
     def _blank(self) -> Image:
         return np.zeros((self.cfg.camera.height_px, self.cfg.camera.width_px, 3), dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""Registers the environments with Gymnasium; called by Gymnasium itself through the package's entry point."""
+"""Registers the environments with Gymnasium; `import auvdock` calls it."""
 
 from __future__ import annotations
 

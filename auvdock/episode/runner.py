@@ -49,8 +49,8 @@ class EpisodeRunner:
             ConfigError: a name that does not exist or a value that does not fit.
         """
         self.cfg = cfg
-        self.world = DockingWorld(cfg.world, cfg.perception.detector)
         self.detector = make_detector(cfg.perception.detector)
+        self.world = DockingWorld(cfg.world, cfg.perception.detector)
         self.perception = BeaconPerception(cfg.perception, self.world.camera, cfg.world.station.layout)
         self.pilot = ConicalPilot(
             cfg.control,

@@ -38,15 +38,18 @@ def assert_equal(first, second):
         assert np.array_equal(one, other), (one, other)
 
 
+@pytest.mark.filterwarnings("error::UserWarning")
 @pytest.mark.parametrize("observation", ["state", "pose"])
 def test_environment_checker_is_content(observation):
     check_env(DockingEnv(observation=observation), skip_render_check=True)
 
 
 @pytest.mark.render
+@pytest.mark.filterwarnings("error::UserWarning")
 def test_environment_checker_is_content_with_images():
-    env = DockingEnv(SMALL, observation="image", fidelity="pixels", render_mode="rgb_array")
-    check_env(env)
+    options = {"cfg": SMALL, "observation": "image", "fidelity": "pixels", "render_mode": "rgb_array"}
+    env = gymnasium.make("auvdock/ConicalDocking-v0", **options)
+    check_env(env.unwrapped)
     env.close()
 
 
@@ -77,6 +80,7 @@ def test_same_seed_same_images():
 
 
 def test_registered_name_and_vector_environments():
+    assert "auvdock/ConicalDocking-v0" in gymnasium.registry  # `import auvdock` is enough
     env = gymnasium.make("auvdock/ConicalDocking-v0", observation="pose")
     assert isinstance(env.unwrapped, DockingEnv)
     vector = gymnasium.make_vec("auvdock/ConicalDocking-v0", num_envs=2, vectorization_mode="sync")

@@ -1,5 +1,6 @@
 """Whole episodes in the `beacons` fidelity: determinism, bookkeeping, failure causes."""
 
+import dataclasses
 import json
 import os
 import signal
@@ -8,7 +9,10 @@ import sys
 import time
 
 import pytest
+from rerun.chunk import RrdReader
 
+from auvdock.core.station import load_conical_station
+from auvdock.core.strict import to_plain
 from auvdock.episode.config import LEVELS, EpisodeCfg, level_cfg
 from auvdock.episode.result import FAILURE_REASONS, EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
@@ -71,9 +75,10 @@ def test_time_out_is_charged_to_the_stage_in_which_it_ran_out():
     assert result.time_s == pytest.approx(3.0, abs=1.0 / 30.0)
 
 
-def test_darkness_ends_as_a_failed_search():
-    """With the lights as good as off there is nothing to find; nothing leaks the station's place to the pilot."""
-    cfg = beacons(attenuation_per_m=12.0, limits={"max_time_s": 30.0})
+def test_without_light_nothing_leads_to_the_station():
+    """With the lamps as good as off there is nothing to find; no truth leaks the station's place to the pilot."""
+    lamps = [to_plain(dataclasses.replace(lamp, power_w=1e-12)) for lamp in load_conical_station().beacons]
+    cfg = beacons(station={"array_power_w": 1e-12, "beacons": lamps}, limits={"max_time_s": 60.0})
     result = EpisodeRunner(cfg).run(0)
     assert not result.success
     assert result.failure_reason == "search"
@@ -111,7 +116,20 @@ def test_every_level_loads_and_differs_from_the_default(level):
 
 def test_interrupt_leaves_a_readable_recording(tmp_path):
     path = tmp_path / "run.rrd"
-    words = ["dock", "conical", "--fidelity", "beacons", "--attenuation", "12", "--record", str(path)]
+    words = [
+        "dock",
+        "conical",
+        "--fidelity",
+        "beacons",
+        "--world.limits.max-time-s",
+        "3600",
+        "--world.start.min-range-m",
+        "100",
+        "--world.start.max-range-m",
+        "100",
+        "--record",
+        str(path),
+    ]
     process = subprocess.Popen([sys.executable, "-m", "auvdock.cli", *words], stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline and (not path.exists() or path.stat().st_size < 20_000):
@@ -120,6 +138,6 @@ def test_interrupt_leaves_a_readable_recording(tmp_path):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Traceback" not in errors
-    from auvdock.recording.viewer import check_recording
-
-    assert check_recording(path) > 0
+    reader = RrdReader(path)
+    paths = {chunk.entity_path for entry in reader.recordings() for chunk in reader.stream(store=entry)}
+    assert len(paths) > 5
