@@ -12,11 +12,13 @@ import numpy as np
 
 from auvdock.assets import asset
 from auvdock.core.arrays import Array, BoolArray
-from auvdock.core.contracts import BLUE, RED, Detections
+from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
 
 __all__ = ["Candidates", "DetectionModelCfg", "draw_detections", "load_detection_model", "merge_close"]
+
+_ONES = np.ones(2)
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ class Candidates:
         radius_px: (m,) radius of the saturated disc, 0 without one.
         width_px: (m,) width of the spot.
         flux: (m,) weight of the light in a merged centre.
-        red: (m,) whether red is its brightest channel.
+        red: (m,) whether red is its brightest channel: class `RED` (1), else `BLUE` (0).
     """
 
     pixels: Array
@@ -117,17 +119,23 @@ def draw_detections(
     found *= model.contrast_50_dn**model.slope
     found += 1.0
     hit = (chance[0] * found < model.ceiling) & (contrast > 0.0)
-    index = np.flatnonzero(hit)
+    index = hit.nonzero()[0]
     index = index[(-contrast[index]).argsort(kind="stable")]
     snr = contrast[index] / merged.noise_dn[index]
-    spread = np.sqrt(model.centre_floor_px**2 + (model.centre_noise * merged.width_px[index] / snr) ** 2)
-    centre = merged.pixels[index] + noise[index] * spread[:, None]
-    strength = model.score_gain * snr
-    score = strength / (strength + 10.0)
-    wrong = chance[1, index] < model.wrong_colour
-    class_id = np.where(merged.red[index] != wrong, RED, BLUE)
-    half = np.maximum(merged.radius_px[index], merged.width_px[index])[:, None]
-    xyxy = np.concatenate([centre - half, centre + half], axis=1)
+    width = merged.width_px[index]
+    spread = width * (model.centre_noise / snr)
+    spread *= spread
+    spread += model.centre_floor_px**2
+    centre = noise[index]
+    centre *= np.sqrt(spread)[:, None]
+    centre += merged.pixels[index]
+    snr *= model.score_gain
+    score = snr / (snr + 10.0)
+    class_id = (merged.red[index] != (chance[1, index] < model.wrong_colour)).astype(np.int64)
+    half = np.maximum(merged.radius_px[index], width)[:, None]
+    xyxy = np.empty((len(index), 4))
+    xyxy[:, :2] = centre - half
+    xyxy[:, 2:] = centre + half
     if alarms:
         ghosts = rng.random((alarms, 2)) * np.array(size_px) - 0.5
         centre = np.concatenate([centre, ghosts])
@@ -145,11 +153,12 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
     m = len(seen.flux)
     if m < 2:
         return seen
-    dx = seen.pixels[:, 0] - seen.pixels[:, :1]
-    dy = seen.pixels[:, 1] - seen.pixels[:, 1:]
+    offset = seen.pixels[:, None, :] - seen.pixels
+    offset *= offset
     reach = model.merge_radii * seen.radius_px
-    limit = reach + (reach[:, None] + model.merge_px)
-    close = dx * dx + dy * dy < limit * limit
+    limit = reach[:, None] + (reach + model.merge_px)
+    limit *= limit
+    close = offset @ _ONES < limit
     if np.count_nonzero(close) == m:
         return seen
     pixels, contrast, flux = seen.pixels.copy(), seen.contrast_dn.copy(), seen.flux.copy()

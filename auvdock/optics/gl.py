@@ -36,11 +36,12 @@ class StaticRenderer:
         self._size = (width_px, height_px)
         self._tangents = (tangent_x, tangent_y)
         self._process = -1
-        self._gl: Any = None
         self._drop()
 
     def _drop(self) -> None:
-        self._gl, self._context, self._scene, self._data = None, None, None, None
+        self._gl: Any = None
+        self._context: Any = None
+        self._scene: Any = None
         self._process = -1
 
     def __getstate__(self) -> dict[str, Any]:
@@ -127,7 +128,7 @@ class StaticRenderer:
         light.headlight, light.castshadow = 0, 0
         light.pos[:], light.dir[:] = (0.0, 0.0, 10.0), (0.0, 0.0, -1.0)
         light.ambient[:], light.diffuse[:], light.specular[:] = 0.5, 0.5, 0.0
-        self._scene, self._data = scene, data
+        self._scene = scene
         self._process = os.getpid()
 
 

@@ -3,9 +3,9 @@
 Wells' optical transfer function of a path r is e^{-(a+b) r} e^{b r F(ψ)} with F = (1 - e^{-k}) / k, k = 2π θ0 ψ and ψ
 in cycles per radian. Without its unscattered part it is e^{-a r} × e^{-b r} (e^{b r F} - 1).
 
-F is the mean of e^{-k u} for u uniform on [0, 1], hence e^{-b r} e^{b r F} is the mean of e^{-k S} where S is the sum of
-N such u and N is Poisson distributed with mean b r: N is the number of scattering events, u where on the path each of
-them happened. And e^{-2π θ0 S ψ} is the transform of s / (2π (θ² + s²)^{3/2}) with s = θ0 S. So the Hankel transform
+F is the mean of e^{-k u} for u uniform on [0, 1], hence e^{-b r} e^{b r F} is the mean of e^{-k S} where S is the sum
+of N such u and N is Poisson distributed with mean b r: N is the number of scattering events, u where on the path each
+of them happened. And e^{-2π θ0 S ψ} is the transform of s / (2π (θ² + s²)^{3/2}) with s = θ0 S. So the Hankel transform
 of Wells' function is a mixture of that kernel over the distribution of S, with no oscillating integral; the single
 scattering term (N = 1), which has a cusp 1/θ, is in closed form. As a function of θ / θ0 it depends on b r alone.
 """
@@ -43,7 +43,9 @@ class HaloTable:
     def __init__(self, theta0_rad: float) -> None:
         """Scale the universal table to an angle."""
         self.theta0_rad = theta0_rad
-        self._log_br, self._log_t, self._log_density, self._encircled = _universal()
+        log_br, self._log_t, self._log_density, self._encircled = _universal()
+        self._first = float(log_br[0])
+        self._per_step = 1.0 / float(log_br[1] - log_br[0])
 
     def density_rows(self, angle_rad: Array) -> Array:
         """(rows, m) halo per steradian at fixed angles (m,), one row per tabulated b r; see `row_of`."""
@@ -58,10 +60,12 @@ class HaloTable:
 
     def row_of(self, br: Array) -> tuple[IntArray, Array]:
         """Row (n,) below each b r (n,) and the weight (n,) of the row above: linear in log b r."""
-        step = self._log_br[1] - self._log_br[0]
-        place = (np.log(np.minimum(np.maximum(br, _MIN_BR), _MAX_BR)) - self._log_br[0]) / step
-        row = np.minimum(place.astype(np.int64), _ROWS - 2)
-        return row, place - row
+        place = np.log(np.minimum(np.maximum(br, _MIN_BR), 0.999 * _MAX_BR))
+        place -= self._first
+        place *= self._per_step
+        row = place.astype(np.int64)
+        place -= row
+        return row, place
 
     def density(self, br: float, angle_rad: Array) -> Array:
         """(m,) halo per steradian at angles (m,) for one b r."""

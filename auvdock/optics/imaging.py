@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import cv2
@@ -12,7 +13,6 @@ from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Frame
-from auvdock.optics.bands import BANDS_NM, electrons_per_joule
 from auvdock.optics.exposure import AutoExposure
 from auvdock.optics.lights_image import LightsImage, add_spot
 from auvdock.optics.metering import predicted_share
@@ -23,7 +23,7 @@ from auvdock.optics.settings import ExposureCfg, ImagingCfg
 from auvdock.optics.surfaces import Surfaces
 from auvdock.optics.water import WaterCfg
 
-__all__ = ["ExposureCfg", "HasModel", "ImagingCfg", "UnderwaterCamera"]
+__all__ = ["ExposureCfg", "HasModel", "ImagingCfg", "Shot", "UnderwaterCamera"]
 
 
 class HasModel(Protocol):
@@ -33,6 +33,23 @@ class HasModel(Protocol):
     def model(self) -> Any:  # noqa: ANN401
         """The `mujoco.MjModel` whose static geoms are drawn."""
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """A frame and how it came about.
+
+    Attributes:
+        frame: the image.
+        view: the lights behind it.
+        exposure_s: exposure time.
+        gain: analogue gain.
+    """
+
+    frame: Frame
+    view: View
+    exposure_s: float
+    gain: float
 
 
 class UnderwaterCamera:
@@ -67,8 +84,6 @@ class UnderwaterCamera:
         self._cfg, self._camera, self._water = cfg, camera, water
         self._sensor = Sensor(camera.width_px, camera.height_px, cfg)
         self._surfaces = Surfaces(self.lit, scene.model) if scene is not None and cfg.surfaces else None
-        per_joule = np.array([electrons_per_joule(nm) for nm in BANDS_NM])
-        self._band_electrons = (per_joule * self.lit.lens.aperture_m2).T
         solid = self.lit.lens.solid_angle_sr.astype(np.float32)
         self._solid_angle = solid[:, :, None]
         self._buffer = np.empty((camera.height_px, camera.width_px, 3), dtype=np.float32)
@@ -92,14 +107,17 @@ class UnderwaterCamera:
         Raises:
             GraphicsError: surfaces are to be seen and no OpenGL context can be had.
         """
+        return self.take(T_world_body, time_s).frame
+
+    def take(self, T_world_body: Array, time_s: float) -> Shot:
+        """Take a frame as `capture` does, with what it was made of: for fitting detection models."""
         view = self.lit.look(T_world_body, time_s)
         if not self.exposure.settled:
             self.exposure.settle(predicted_share(self.lit, view))
         exposure_s, gain = self.exposure.exposure_s, self.exposure.gain
-        electrons = self.electrons(view, exposure_s, gain)
-        image = self._sensor.expose(electrons, gain)
+        image = self._sensor.expose(self.electrons(view, exposure_s, gain), gain)
         self.exposure.update(saturated_share(image))
-        return Frame(image, time_s, self._camera)
+        return Shot(Frame(image, time_s, self._camera), view, exposure_s, gain)
 
     def electrons(self, view: View, exposure_s: float, gain: float = 1.0) -> NDArray[np.float32]:
         """Mean photo-electrons (H, W, 3), red, green, blue, without noise; valid until the next call."""
@@ -114,13 +132,12 @@ class UnderwaterCamera:
         if surfaces is not None and surfaces.visible(view.T_world_camera[:3, 3], exposure_s * gain):
             rows, columns = surfaces.shape
             image = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR)
-            matrix = (surfaces.electrons * exposure_s).astype(np.float32)
-            image += cv2.transform(surfaces.radiance(view.T_world_camera), matrix)
+            image += surfaces.electrons(view.T_world_camera, exposure_s)
         else:
             image = coarse
             veil = self.lit.veil_w_m2_sr(depth_m)
             if veil.max() > 0.0:
-                image += (self._band_electrons @ veil * exposure_s).astype(np.float32) * self._solid_angle
+                image += (self.lit.electrons_per_j @ veil * exposure_s).astype(np.float32) * self._solid_angle
         if fine_size == size:
             cv2.resize(image, size, self._buffer, interpolation=cv2.INTER_LINEAR)
         else:

@@ -34,16 +34,22 @@ class Lens:
         self.shape = (rows, columns)
         self._x = (np.arange(columns) + 0.5) * self.factor - 0.5
         self._y = (np.arange(rows) + 0.5) * self.factor - 0.5
-        x, y = (grid.ravel() for grid in np.meshgrid(self._x, self._y))
-        self.rays = camera.rays(np.column_stack([x, y]))
-        along_x = camera.rays(np.column_stack([x + 0.5, y])) - camera.rays(np.column_stack([x - 0.5, y]))
-        along_y = camera.rays(np.column_stack([x, y + 0.5])) - camera.rays(np.column_stack([x, y - 0.5]))
+        grid: Array = np.stack(np.meshgrid(self._x, self._y), axis=2).reshape(-1, 2).astype(np.float64)
+        right, down = np.array([0.5, 0.0]), np.array([0.0, 0.5])
+        self.rays = camera.rays(grid)
+        along_x = camera.rays(grid + right) - camera.rays(grid - right)
+        along_y = camera.rays(grid + down) - camera.rays(grid - down)
         g11, g12, g22 = (
             np.einsum("ij,ij->i", one, other)
             for one, other in ((along_x, along_x), (along_x, along_y), (along_y, along_y))
         )
         self.metric = np.column_stack([g11, g12, g22]).reshape(rows, columns, 3)
         self.solid_angle_sr = np.sqrt(g11 * g22 - g12 * g12).reshape(rows, columns)
+        k1, k2, p1, p2, k3 = (float(k) for k in camera.distortion)
+        self._radial = (k1, k2, k3) if p1 == 0.0 and p2 == 0.0 else None
+        self._focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
+        self._centre = np.array([camera.matrix[0, 2], camera.matrix[1, 2]])
+        self._middle = np.array([(camera.width_px - 1) / 2, (camera.height_px - 1) / 2])
         focal_px = float(camera.matrix[0, 0])
         self.rad_per_px = 1.0 / focal_px
         focal_m = focal_px * cfg.sensor_width_m / camera.width_px
@@ -63,16 +69,23 @@ class Lens:
         Rays beyond the image's corners (by more than the margin) have no meaningful pixel: the distortion polynomial
         folds back there.
         """
-        depth = np.maximum(rays[:, 2], 1e-9)
-        tangent2 = (rays[:, 0] ** 2 + rays[:, 1] ** 2) / (depth * depth)
-        slack = (1.0 + margin_px * self.rad_per_px) ** 2
-        near = tangent2 <= self._max_tangent2 * slack
-        pixels = self.camera.project(np.where(near[:, None], rays, _AHEAD))
-        edge = 0.5 + margin_px
-        x, y = pixels[:, 0], pixels[:, 1]
-        inside = (x >= -edge) & (x < self.camera.width_px - 1 + edge)
-        inside &= (y >= -edge) & (y < self.camera.height_px - 1 + edge)
-        return pixels, inside & near
+        xy = rays[:, :2] / np.maximum(rays[:, 2:], 1e-9)
+        x2y2 = xy * xy
+        r2 = x2y2[:, 0] + x2y2[:, 1]
+        limit = self._max_tangent2 * (1.0 + margin_px * self.rad_per_px) ** 2
+        inside = r2 <= limit
+        np.minimum(r2, limit, out=r2)
+        if self._radial is not None:
+            # `Camera.project` without its tangential terms, at a third of its cost for a handful of points.
+            k1, k2, k3 = self._radial
+            pixels = xy * (self._focal * (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)))[:, None])
+            pixels += self._centre
+        else:
+            pixels = self.camera.project(np.where(inside[:, None], rays, _AHEAD))
+        offset = np.abs(pixels - self._middle)
+        inside &= offset[:, 0] < self._middle[0] + (0.5 + margin_px)
+        inside &= offset[:, 1] < self._middle[1] + (0.5 + margin_px)
+        return pixels, inside
 
 
 _AHEAD = np.array([0.0, 0.0, 1.0])

@@ -56,6 +56,8 @@ class LightsImage:
 
     def coarse(self, received: Received, index: IntArray, exposure_s: float) -> NDArray[np.float32]:
         """Smooth parts of the halos of lamps `index` (m,): electrons per image pixel on the coarse grid, (h, w, 3)."""
+        if len(index) == 0:
+            return np.zeros((*self._lens.shape, 3), dtype=np.float32)
         tables, smooth = self._tables(received, index)
         last = self._last_inner
         tables[:, : last + 1] = smooth[:, :1] + smooth[:, 1:2] * self._inner_angle2
@@ -116,7 +118,10 @@ class LightsImage:
         """Per lamp the density on the shared index (m, entries) and the smooth inner part's A, B of A + B θ² (m, 2)."""
         row, weight = self._table.row_of(received.scattering_depth[index])
         weight32 = weight.astype(np.float32)[:, None]
-        tables = self._rows[row] * (1.0 - weight32) + self._rows[row + 1] * weight32
+        tables = self._rows[row + 1]
+        tables -= self._rows[row]
+        tables *= weight32
+        tables += self._rows[row]
         ends = self._inner_rows[row] * (1.0 - weight[:, None]) + self._inner_rows[row + 1] * weight[:, None]
         slope = (ends[:, 2] - ends[:, 1]) / (0.06 * self._split_rad)
         curve = slope / (2.0 * self._split_rad)

@@ -6,19 +6,31 @@ from collections.abc import Callable
 
 import numpy as np
 
+from auvdock.core.arrays import Array
 from auvdock.optics.scene import LitScene, View
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.spots import Spots
 
-__all__ = ["predicted_share"]
+__all__ = ["predicted_share", "veil_share"]
 
 
 def predicted_share(lit: LitScene, view: View, spots: Spots | None = None) -> Callable[[float], float]:
     """Saturated share of the image as a function of sensitivity in seconds.
 
-    Lights whose centre lies off the sensor, overlap of spots and surfaces are left out.
+    Lights whose centre lies off the sensor, overlap of spots and surfaces are left out; the veil counts.
     """
     shown = lit.spots.spots(view.received, np.flatnonzero(view.inside)) if spots is None else spots
     saturated_e = SensorScale(lit.cfg, 1.0).saturated_e
     model = lit.spots
-    return lambda sensitivity_s: model.share(model.saturated_area_px2(shown, saturated_e / sensitivity_s))
+    veil_e_s = lit.veil_e_s(-float(view.T_world_camera[2, 3]))
+
+    def share(sensitivity_s: float) -> float:
+        level = saturated_e / sensitivity_s
+        return model.share(model.saturated_area_px2(shown, level)) + veil_share(veil_e_s, level)
+
+    return share
+
+
+def veil_share(veil_e_s: Array, level_e_s: float) -> float:
+    """Share of samples that a uniform veil (3,) lifts above a level, both in electrons per second."""
+    return float(np.mean(veil_e_s >= level_e_s))

@@ -19,6 +19,8 @@ from auvdock.optics.water import WaterCfg
 
 __all__ = ["LightSet", "Received"]
 
+_ONES = np.ones(3)
+
 
 @dataclass(frozen=True, eq=False)
 class Received:
@@ -68,6 +70,7 @@ class LightSet:
         self.peak_w_sr = np.array([peak_intensity_w_sr(lamp) for lamp in lamps])
         self.flux_w = np.array([lamp.power_w * lamp.efficiency for lamp in lamps])
         half = np.radians([lamp.beam_angle_deg for lamp in lamps]) / 2.0
+        self._back = -self.axes
         self._minus_profile = -math.log(2.0) / half**2
         self.absorption_per_m = np.array([water.absorption_at(lamp.wavelength_nm) for lamp in lamps])
         self.scattering_per_m = np.array([water.scattering_at(lamp.wavelength_nm) for lamp in lamps])
@@ -86,18 +89,26 @@ class LightSet:
         """Core and halo irradiance of every lamp at a camera pose (4, 4)."""
         camera = T_station_camera[:3, 3]
         offset = self.positions_m - camera
-        r2 = np.einsum("ij,ij->i", offset, offset)
-        r = np.sqrt(np.maximum(r2, 1e-4))
+        r2 = (offset * offset) @ _ONES
+        np.maximum(r2, 1e-4, out=r2)
+        r = np.sqrt(r2)
         ray = offset / r[:, None]
-        cosine = np.einsum("ij,ij->i", ray, self.axes)
-        angle = np.arccos(np.clip(-cosine, -1.0, 1.0))
-        total = self.peak_w_sr * np.exp(self._minus_profile * angle * angle - self.absorption_per_m * r) / (r * r)
+        cosine = (ray * self._back) @ _ONES
+        np.maximum(cosine, -1.0, out=cosine)
+        angle = np.arccos(np.minimum(cosine, 1.0, out=cosine))
+        exponent = self._minus_profile * angle
+        exponent *= angle
+        exponent -= self.absorption_per_m * r
+        total = np.exp(exponent, out=exponent)
+        total *= self.peak_w_sr
+        total /= r2
         ahead = float(camera[0]) - self._rim_x
         if ahead > 0.0 and len(self._recessed):
             share = (self._setback / (self._setback + ahead))[:, None]
             crossing = self._recessed_yz * (1.0 - share) + (camera[1:] - self._rim_centre) * share
-            hidden = np.einsum("ij,ij->i", crossing, crossing) > self._rim_radius2
-            total[self._recessed[hidden]] = 0.0
+            hidden = (crossing * crossing) @ _ONES[:2] > self._rim_radius2
+            if hidden.any():
+                total[self._recessed[hidden]] = 0.0
         depth = self.scattering_per_m * r
         core = total * np.exp(-depth)
         return Received(ray @ T_station_camera[:3, :3], r, depth, core, total - core)

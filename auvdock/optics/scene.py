@@ -11,6 +11,7 @@ from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.beacons import BeaconCfg, BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.transforms import invert
+from auvdock.optics.bands import BANDS_NM, electrons_per_joule
 from auvdock.optics.lens import Lens
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_streams
 from auvdock.optics.radiometry import LightSet, Received
@@ -60,6 +61,8 @@ class LitScene:
         self.T_world_station = T_world_station
         self._T_station_world = invert(T_world_station)
         self.lens = Lens(camera, cfg)
+        self.electrons_per_j = np.array([electrons_per_joule(nm) for nm in BANDS_NM]).T * self.lens.aperture_m2
+        """(3, 3) electrons per second of each channel (row) for 1 W/(m² sr) over 1 sr in each band (column)."""
         self.snow = MarineSnow(nuisance.snow_level, self.lens, float(water.attenuation[0]))
         self._fluctuates = nuisance.flicker != "none" or nuisance.marine_snow != "none"
         self._mirrors = nuisance.surface_reflection != "none"
@@ -92,6 +95,10 @@ class LitScene:
         """
         a, bb = self.water.absorption, self.water.backscattering
         return self.daylight_w_m2(depth_m) * bb / (2.0 * math.pi * np.maximum(a + bb, 1e-9))
+
+    def veil_e_s(self, depth_m: float) -> Array:
+        """(3,) electrons per second of the veil in a pixel in the middle of the image: red, green, blue."""
+        return self.electrons_per_j @ self.veil_w_m2_sr(depth_m) * self.lens.rad_per_px**2
 
     def look(self, T_world_body: Array, time_s: float) -> View:
         """Light at the camera now; advances flicker and occlusions to `time_s`."""

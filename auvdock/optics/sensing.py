@@ -10,7 +10,6 @@ from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Detections
-from auvdock.optics.bands import BANDS_NM, electrons_per_joule
 from auvdock.optics.detection_model import (
     Candidates,
     DetectionModelCfg,
@@ -18,15 +17,17 @@ from auvdock.optics.detection_model import (
     load_detection_model,
 )
 from auvdock.optics.exposure import AutoExposure
-from auvdock.optics.metering import predicted_share
+from auvdock.optics.metering import predicted_share, veil_share
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.scene import LitScene, View
-from auvdock.optics.sensor import SensorScale
+from auvdock.optics.sensor import SensorScale, sensor_scale
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.spots import Spots
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeaconSensor", "candidates_in_view"]
+
+_ONES = np.ones(2)
 
 
 class BeaconSensor:
@@ -74,7 +75,7 @@ class BeaconSensor:
     def detect(self, T_world_body: Array, time_s: float) -> Detections:
         """Detections of a frame from a body pose (4, 4)."""
         view = self.lit.look(T_world_body, time_s)
-        index = np.flatnonzero(view.inside)
+        index = view.inside.nonzero()[0]
         spots = self.lit.spots.spots(view.received, index)
         exposure = self.exposure
         if not exposure.settled:
@@ -99,28 +100,31 @@ def candidates_in_view(
         gain: analogue gain.
     """
     pixels = view.pixels[view.inside]
-    scale = SensorScale(lit.cfg, gain)
+    scale = sensor_scale(lit.cfg, gain)
     model = lit.spots
     area = model.saturated_area_px2(spots, scale.saturated_e / exposure_s)
     share = model.share(area)
     channel = spots.channel * exposure_s
     best = channel.argmax(axis=1)
-    dx = pixels[:, 0] - pixels[:, :1]
-    dy = pixels[:, 1] - pixels[:, 1:]
-    spread = model.at_distance(spots, np.sqrt(dx * dx + dy * dy))
-    level = spread * channel.T[best]
+    offset = pixels[:, None, :] - pixels
+    offset *= offset
+    level = model.at_distance(spots, offset @ _ONES)
+    level *= channel.T[best]
     around = level.sum(axis=1)
-    own = level.diagonal()
+    own = level.diagonal().copy()
     around -= own
     if lit.nuisance.daylight != "none":
-        veil = _band_electrons(lit) @ lit.veil_w_m2_sr(-float(view.T_world_camera[2, 3])) * exposure_s
+        veil = lit.veil_e_s(-float(view.T_world_camera[2, 3])) * exposure_s
         around += veil[best]
-    contrast = np.minimum(scale.codes(around + own), 255.0) - np.minimum(scale.codes(around), 255.0)
+        share += veil_share(veil, scale.saturated_e)
+    codes = np.array((around + own, around))
+    codes = np.minimum(scale.codes(codes), 255.0)
+    contrast = codes[0] - codes[1]
     seen = Candidates(
         pixels,
         contrast,
         scale.noise_dn(around + own),
-        np.sqrt(area.max(axis=1, initial=0.0) * (1.0 / math.pi)),
+        np.sqrt(area.max(axis=1) * (1.0 / math.pi)),
         spots.sigma_px,
         own,
         best == 0,
@@ -150,9 +154,3 @@ def _with_flakes(lit: LitScene, view: View, seen: Candidates, scale: SensorScale
         np.concatenate([seen.flux, peak[shown]]),
         np.concatenate([seen.red, np.full(len(shown), best == 0)]),
     )
-
-
-def _band_electrons(lit: LitScene) -> Array:
-    """(3, 3) electrons per second and pixel for radiance 1 W/(m² sr) per band, in the middle of the image."""
-    per_joule = np.array([electrons_per_joule(nm) for nm in BANDS_NM])
-    return (per_joule * lit.lens.aperture_m2 * lit.lens.rad_per_px**2).T

@@ -13,6 +13,7 @@ rounded and clipped to 0…255. In both, the decoded electrons have a variance t
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array, Image
 from auvdock.optics.settings import ImagingCfg
 
-__all__ = ["SATURATED_CODE", "Sensor", "SensorScale", "saturated_share"]
+__all__ = ["SATURATED_CODE", "Sensor", "SensorScale", "saturated_share", "sensor_scale"]
 
 SATURATED_CODE = 250
 """Samples from this code upwards count as saturated in the exposure metering."""
@@ -38,13 +39,20 @@ class SensorScale:
         self.read_e = cfg.read_noise_e
         self.full_scale_e = cfg.full_well_e / gain
         self.dn_per_root = 255.0 / (math.sqrt(self.full_scale_e + self._read2) - cfg.read_noise_e)
-        self.saturated_e = float(self.electrons(np.array([SATURATED_CODE]))[0])
+        self._noise_dn = math.sqrt(0.25 * self.dn_per_root**2 + 1.0 / 12.0)
+        if self._linear:
+            self.saturated_e = SATURATED_CODE * self.full_scale_e / 255.0
+        else:
+            self.saturated_e = (SATURATED_CODE / self.dn_per_root + self.read_e) ** 2 - self._read2
 
     def codes(self, electrons: Array) -> Array:
         """Unrounded, unclipped codes of electrons, any shape."""
         if self._linear:
             return electrons * (255.0 / self.full_scale_e)
-        return (np.sqrt(electrons + self._read2) - self.read_e) * self.dn_per_root
+        root = np.sqrt(electrons + self._read2)
+        root -= self.read_e
+        root *= self.dn_per_root
+        return root
 
     def electrons(self, codes: Array) -> Array:
         """Electrons of codes, any shape; inverse of `codes`."""
@@ -56,7 +64,13 @@ class SensorScale:
         """Standard deviation of the code at a signal in electrons, quantisation included."""
         if self._linear:
             return np.sqrt((electrons + self._read2) * (255.0 / self.full_scale_e) ** 2 + 1.0 / 12.0)
-        return np.full_like(electrons, math.sqrt(0.25 * self.dn_per_root**2 + 1.0 / 12.0))
+        return np.full(electrons.shape, self._noise_dn)
+
+
+@lru_cache(maxsize=64)
+def sensor_scale(cfg: ImagingCfg, gain: float) -> SensorScale:
+    """The scale at one gain, kept."""
+    return SensorScale(cfg, gain)
 
 
 class Sensor:

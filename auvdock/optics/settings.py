@@ -61,7 +61,7 @@ class ImagingCfg:
     """Standard deviation of the lens' point spread function, a Gaussian."""
     lamp_radius_m: float = 0.02
     """Radius of a lamp's emitting face: what a lamp is wide at close range."""
-    lamp_spill: float = 0.03
+    lamp_spill: float = 0.1
     """Share of a lamp's flux that leaves its mount and nearby water in all directions and lights the station."""
     full_well_e: float = 40000.0
     """Electrons at which a pixel saturates at gain 1."""

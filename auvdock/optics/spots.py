@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, IntArray
 from auvdock.optics.halo import halo_table
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet, Received
@@ -16,6 +16,7 @@ from auvdock.optics.water import WaterCfg
 __all__ = ["SpotModel", "Spots"]
 
 _RADII = 32
+_TWO_PI = 2.0 * math.pi
 
 
 class Spots:
@@ -49,8 +50,10 @@ class SpotModel:
         edges = np.concatenate([[0.0], np.sqrt(self.radii_px[1:] * self.radii_px[:-1]), self.radii_px[-1:]])
         self.ring_px2 = math.pi * np.diff(edges**2)
         self._minus_half_r2 = -0.5 * self.radii_px**2
-        self._log_first = math.log(self.radii_px[0])
-        self._log_step = math.log(self.radii_px[1] / self.radii_px[0])
+        self._first2 = float(self.radii_px[0]) ** 2
+        self._log_first2 = math.log(self._first2)
+        self._per_log2 = 0.5 / math.log(self.radii_px[1] / self.radii_px[0])
+        self._starts = np.arange(0, lights.count * _RADII, _RADII)
         table = halo_table(water.scattering_angle_rad)
         self._table = table
         self._rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
@@ -63,16 +66,21 @@ class SpotModel:
         """(n,) standard deviation of the core on the sensor."""
         return np.sqrt(self._lens_sigma2 + self._lamp_px_m2 / (range_m * range_m))
 
-    def spots(self, received: Received, index: Array, factor: Array | float = 1.0) -> Spots:
-        """Profiles of the lights `index` (m,); `factor` scales each light (scintillation)."""
-        core, halo = received.core_w_m2[index] * factor, received.halo_w_m2[index] * factor
-        sigma2 = self._lens_sigma2 + self._lamp_px_m2 / received.range_m[index] ** 2
+    def spots(self, received: Received, index: IntArray) -> Spots:
+        """Profiles of the lights `index` (m,)."""
+        core, halo, range_m = received.core_w_m2[index], received.halo_w_m2[index], received.range_m[index]
+        sigma2 = self._lamp_px_m2 / (range_m * range_m)
+        sigma2 += self._lens_sigma2
         row, weight = self._table.row_of(received.scattering_depth[index])
         lower = self._rows[row]
-        profile = lower + (self._rows[row + 1] - lower) * weight[:, None]
+        profile = self._rows[row + 1]
+        profile -= lower
+        profile *= weight[:, None]
+        profile += lower
         profile *= halo[:, None]
-        gauss = np.exp(self._minus_half_r2 / sigma2[:, None])
-        gauss *= (core / (2.0 * math.pi * sigma2))[:, None]
+        gauss = self._minus_half_r2 / sigma2[:, None]
+        np.exp(gauss, out=gauss)
+        gauss *= (core / (_TWO_PI * sigma2))[:, None]
         profile += gauss
         return Spots(core, halo, np.sqrt(sigma2), profile, self._channel[index])
 
@@ -88,11 +96,16 @@ class SpotModel:
         """Share of the image's samples that areas (m, 3) are."""
         return float(area_px2.sum()) / self._samples
 
-    def at_distance(self, spots: Spots, distance_px: Array) -> Array:
-        """(m, m) irradiance per pixel at `distance_px` (m, m) from the lights along the second axis."""
-        place = np.log(np.maximum(distance_px, self.radii_px[0]))
-        place -= self._log_first
-        place *= 1.0 / self._log_step
-        index = np.minimum(place.astype(np.int64), _RADII - 1)
-        index += np.arange(0, index.shape[0] * _RADII, _RADII)
-        return spots.profile.ravel().take(index)
+    def at_distance(self, spots: Spots, distance2_px2: Array) -> Array:
+        """(m, m) irradiance per pixel at squared distances (m, m) from the lights along the second axis.
+
+        Taken at the nearest tabulated radius; the radii are 22 % apart.
+        """
+        place = np.log(np.maximum(distance2_px2, self._first2))
+        place -= self._log_first2
+        place *= self._per_log2
+        place += 0.5
+        index = place.astype(np.int64)
+        np.minimum(index, _RADII - 1, out=index)
+        index += self._starts[: len(index)]
+        return spots.profile.take(index)

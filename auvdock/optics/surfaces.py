@@ -1,9 +1,9 @@
 """Station and floor in the water: the revised image formation model (Akkaynak & Treibitz 2018).
 
 Per band, I = J e^{-β_D z} + B∞ (1 - e^{-β_B z}) with z the distance along the ray. The direct signal carries the image
-and loses all that is scattered: β_D = c = a + b. The veil is lit by daylight from all sides, to which forward scattering
-is no loss: β_B = a + b_b (Gordon 1973). J = ρ E / π, with E the daylight at depth, shaded from above, plus the spill
-light of the station's own lamps, Φ s / (4π d²) e^{-a d} with a quarter of it for the mean obliquity.
+and loses all that is scattered: β_D = c = a + b. The veil is lit by daylight from all sides, to which forward
+scattering is no loss: β_B = a + b_b (Gordon 1973). J = ρ E / π, with E the daylight at depth, shaded from above, plus
+the spill light of the station's own lamps, Φ s / (4π d²) e^{-a d} with a quarter of it for the mean obliquity.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
-from auvdock.optics.bands import BANDS_NM, electrons_per_joule
+from auvdock.optics.bands import BANDS_NM
 from auvdock.optics.gl import StaticRenderer
 from auvdock.optics.scene import LitScene
 from auvdock.sim.mj import MjModel, mujoco
@@ -39,7 +39,9 @@ class Surfaces:
         self.shape = (lens.shape[0] * lens.factor // step, lens.shape[1] * lens.factor // step)
         rows, columns = self.shape
         x, y = np.meshgrid((np.arange(columns) + 0.5) * step - 0.5, (np.arange(rows) + 0.5) * step - 0.5)
-        tangents = camera.normalise(np.column_stack([x.ravel(), y.ravel()])).reshape(rows, columns, 2)
+        tangents = camera.normalise(np.column_stack([x.ravel(), y.ravel()]).astype(np.float64)).reshape(
+            rows, columns, 2
+        )
         half_x, half_y = (1.02 * float(np.abs(tangents[:, :, k]).max()) for k in range(2))
         width = round(columns * half_x / float(np.abs(tangents[rows // 2, :, 0]).max()))
         height = round(rows * half_y / float(np.abs(tangents[:, columns // 2, 1]).max()))
@@ -54,12 +56,8 @@ class Surfaces:
         water = lit.water
         self._beta_direct = water.attenuation
         self._beta_veil = water.absorption + water.backscattering
-        per_joule = np.array([electrons_per_joule(nm) for nm in BANDS_NM])
-        self.electrons = (per_joule * lens.aperture_m2 * float(np.median(lens.solid_angle_sr))).T
-        """(3, 3) electrons per second of each channel (row) for radiance 1 W/(m² sr) in each band (column)."""
-        solid = lens.solid_angle_sr / np.median(lens.solid_angle_sr)
-        size = (camera.width_px, camera.height_px)
-        self.vignette = cv2.resize(solid.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)[:, :, None]
+        solid = cv2.resize(lens.solid_angle_sr.astype(np.float32), (columns, rows), interpolation=cv2.INTER_LINEAR)
+        self._solid_angle = np.repeat(solid[:, :, None], 3, axis=2)
 
         count = lit.lights.station_count
         nm = np.array([beacon.wavelength_nm for beacon in lit.layout.beacons])
@@ -83,9 +81,21 @@ class Surfaces:
         daylight = self._lit.daylight_w_m2(-float(position_world_m[2]))
         through = np.exp(-self._geoms.distance_m(position_world_m)[:, None] * self._beta_direct)
         radiance = (self._lamp_irradiance + daylight) * through * _GREATEST_RADIANCE
-        signal = float((radiance @ self.electrons.T).max(initial=0.0)) * sensitivity_s
-        veil = float((self.electrons @ self._lit.veil_w_m2_sr(-float(position_world_m[2]))).max()) * sensitivity_s
+        per_pixel = self._lit.electrons_per_j.T * (sensitivity_s * self._lit.lens.rad_per_px**2)
+        signal = float((radiance @ per_pixel).max(initial=0.0))
+        veil = float(self._lit.veil_e_s(-float(position_world_m[2])).max()) * sensitivity_s
         return signal > math.sqrt(self._lit.cfg.read_noise_e**2 + veil)
+
+    def electrons(self, T_world_camera: Array, exposure_s: float) -> NDArray[np.float32]:
+        """Electrons (h, w, 3) per image pixel, red, green, blue, at half resolution.
+
+        Raises:
+            GraphicsError: no OpenGL context can be had.
+        """
+        image = cv2.transform(
+            self.radiance(T_world_camera), (self._lit.electrons_per_j * exposure_s).astype(np.float32)
+        )
+        return np.asarray(cv2.multiply(image, self._solid_angle, image), dtype=np.float32)
 
     def radiance(self, T_world_camera: Array) -> NDArray[np.float32]:
         """Radiance per band (h, w, 3) in W/(m² sr), blue, green, red, at half resolution.
@@ -96,7 +106,7 @@ class Surfaces:
         colour, depth = self._renderer.render(T_world_camera)
         colour = cv2.remap(colour, self._map_x, self._map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         depth = cv2.remap(depth, self._map_x, self._map_y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
-        distance = cv2.multiply(depth, self._stretch)
+        distance = np.asarray(cv2.multiply(depth, self._stretch), dtype=np.float32)
         depth_m = -float(T_world_camera[2, 3])
         daylight = self._lit.daylight_w_m2(depth_m)
         veil = self._lit.veil_w_m2_sr(depth_m)
@@ -108,7 +118,7 @@ class Surfaces:
         np.minimum(distance, np.float32(1e3), out=distance)
         path = np.repeat(distance[:, :, None], 3, axis=2)
         through = cv2.exp(path * (-self._beta_direct).astype(np.float32))
-        image = cv2.multiply(scene, through)
+        image = np.asarray(cv2.multiply(scene, through), dtype=np.float32)
         if veil.max() > 0.0:
             lost = cv2.exp(path * (-self._beta_veil).astype(np.float32))
             image += (1.0 - lost) * veil.astype(np.float32)
