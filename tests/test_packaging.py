@@ -17,6 +17,7 @@ ORDER = (
     "controllers",
     "envs",
     "episode",
+    "campaign",
     "recording",
     "experiments",
     "cli",

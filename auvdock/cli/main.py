@@ -12,6 +12,7 @@ __all__ = ["COMMANDS", "main"]
 
 COMMANDS = {
     ("dock", "conical"): ("auvdock.cli.dock:run_conical", "dock into the conical station, one episode"),
+    ("sweep",): ("auvdock.cli.sweep:run", "run many episodes over currents, turbidity and more"),
     ("view",): ("auvdock.cli.view:run", "open a recording in the Rerun viewer"),
     ("reproduce", "guidance-space"): (
         "auvdock.cli.reproduce:run_guidance_space",

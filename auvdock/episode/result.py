@@ -10,12 +10,25 @@ from auvdock.core.strict import to_plain
 
 __all__ = ["FAILURE_REASONS", "EpisodeResult"]
 
-FAILURE_REASONS = ("search", "far", "mid", "near", "terminal", "collision", "timeout", "diverged", "interrupted")
+FAILURE_REASONS = (
+    "search",
+    "far",
+    "mid",
+    "near",
+    "terminal",
+    "collision",
+    "timeout",
+    "diverged",
+    "interrupted",
+    "hung",
+    "crashed",
+)
 """Why an episode failed: the guidance stage in which the pilot gave up or time ran out, or what ended it.
 
 `search` to `terminal`: the pilot gave up, or time ran out, in that stage. `collision`: a contact harder than the
 vehicle's structure bears. `timeout`: time ran out while backing off for another attempt. `diverged`: the simulation's
-state became absurd. `interrupted`: the user stopped it.
+state became absurd. `interrupted`: the user stopped it. In campaigns only, `hung`: it took longer than its wall-clock
+limit; `crashed`: it raised an exception or took its worker down.
 """
 
 

@@ -1,0 +1,199 @@
+"""What a campaign varies: an axis is one quantity with a grid of values or a distribution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from scipy.stats import truncnorm
+
+from auvdock.core.errors import ConfigError
+
+__all__ = ["ALIASES", "DISTRIBUTIONS", "AxisCfg", "AxisValue", "nested", "parse_axis"]
+
+AxisValue = float | int | str | bool
+"""What an axis can set."""
+
+ALIASES: Mapping[str, tuple[str, ...]] = {
+    "level": ("level",),
+    "current": ("world.sim.current.speed_m_s",),
+    "current_direction": ("world.sim.current.direction_deg",),
+    "gust": ("world.sim.current.gust_std_m_s",),
+    "shear": ("world.sim.current.shear_per_m",),
+    "attenuation": ("world.attenuation_per_m",),
+    "water": ("world.water",),
+    "flicker": ("world.nuisance.flicker",),
+    "marine_snow": ("world.nuisance.marine_snow",),
+    "interfering_lights": ("world.nuisance.interfering_lights",),
+    "surface_reflection": ("world.nuisance.surface_reflection",),
+    "daylight": ("world.nuisance.daylight",),
+    "start_range": ("world.start.min_range_m", "world.start.max_range_m"),
+    "start_lateral": ("world.start.lateral_m",),
+    "start_vertical": ("world.start.vertical_m",),
+    "start_heading": ("world.start.heading_deg",),
+    "detector": ("perception.detector",),
+    "association": ("perception.association",),
+    "fidelity": ("world.fidelity",),
+}
+"""Short names of axes and the episode's settings that each sets; any other dotted setting is its own name."""
+
+DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
+"""`normal` has 95 % of its mass between low and high and is cut off there."""
+
+_Z95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class AxisCfg:
+    """One varied quantity.
+
+    With `values`, or with `low`, `high` and `count`, it is a grid axis; with `low` and `high` alone each episode draws
+    from the distribution.
+    """
+
+    name: str
+    """Short name (`ALIASES`) or dotted setting of the episode; the rows' column bears it too."""
+    values: tuple[float | int | str | bool, ...] = ()
+    """Grid values, in order."""
+    low: float | None = None
+    """Least value."""
+    high: float | None = None
+    """Greatest value."""
+    count: int = 0
+    """Grid values between low and high, both included; 0 draws from the distribution."""
+    distribution: str = "uniform"
+    """"uniform", "log_uniform" or "normal"."""
+
+    def __post_init__(self) -> None:
+        """Refuse axes without values or with two meanings."""
+        field = f"axes.{self.name}"
+        if self.values:
+            if self.low is not None or self.high is not None or self.count:
+                raise ConfigError(field, self.values, "either values or low and high")
+            kinds = {_kind(value) for value in self.values}
+            if len(kinds) != 1 or len(set(self.values)) != len(self.values):
+                raise ConfigError(field, self.values, "different values of one kind")
+            return
+        if self.low is None or self.high is None:
+            raise ConfigError(field, (self.low, self.high), "values, or low and high")
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            raise ConfigError(field, (self.low, self.high), "finite numbers with low below high")
+        if self.count < 0 or self.count == 1:
+            raise ConfigError(f"{field}.count", self.count, "2 or more grid values, or 0 to draw from a distribution")
+        if self.distribution not in DISTRIBUTIONS:
+            raise ConfigError(f"{field}.distribution", self.distribution, f"one of {', '.join(DISTRIBUTIONS)}")
+        if self.distribution == "log_uniform" and self.low <= 0.0:
+            raise ConfigError(f"{field}.low", self.low, "a number above 0 for log_uniform")
+
+    @property
+    def is_grid(self) -> bool:
+        """A grid axis, not a drawn one."""
+        return bool(self.values) or self.count > 0
+
+    @property
+    def grid(self) -> tuple[AxisValue, ...]:
+        """The grid's values; empty if the axis is drawn."""
+        if self.values:
+            return self.values
+        if not self.count or self.low is None or self.high is None:
+            return ()
+        # Twelve decimals: 0.1 rather than 0.1 + 1e-17, so that values read well and compare equal.
+        step = 1.0 / (self.count - 1)
+        return tuple(round(self.quantile(index * step, "uniform"), 12) for index in range(self.count))
+
+    @property
+    def kind(self) -> type[AxisValue]:
+        """Python type of the values."""
+        return _kind(self.values[0]) if self.values else float
+
+    def quantile(self, probability: float, distribution: str | None = None) -> float:
+        """Value of a drawn axis at a cumulative probability."""
+        if self.low is None or self.high is None:
+            raise ValueError(f"axis {self.name} is a list of values")
+        shape = distribution or self.distribution
+        if shape == "log_uniform":
+            return math.exp(math.log(self.low) + probability * (math.log(self.high) - math.log(self.low)))
+        if shape == "normal":
+            middle, half = (self.low + self.high) / 2.0, (self.high - self.low) / 2.0
+            return middle + half / _Z95 * float(truncnorm.ppf(probability, -_Z95, _Z95))
+        return self.low + probability * (self.high - self.low)
+
+    def changes(self, value: AxisValue) -> dict[str, Any]:
+        """The nested change of an episode's configuration that `value` stands for; nothing for `level`."""
+        result: dict[str, Any] = {}
+        if self.name == "level":
+            return result
+        for field in ALIASES.get(self.name, (self.name,)):
+            result = _join(result, nested(field, value))
+        if self.name == "current_direction":
+            result["world"].setdefault("start", {})["random_current_direction"] = False
+        return result
+
+
+def nested(field: str, value: object) -> dict[str, Any]:
+    """`a.b.c` and a value as nested mappings."""
+    *parents, last = field.split(".")
+    result: dict[str, Any] = {last: value}
+    for name in reversed(parents):
+        result = {name: result}
+    return result
+
+
+def parse_axis(name: str, text: str) -> AxisCfg:
+    """An axis from a flag: `low:high:count` is a grid, `low:high` a distribution, `a,b,c` or one value a list.
+
+    Raises:
+        ConfigError: text that is none of these.
+    """
+    remedy = "low:high:count, low:high, or values with commas between them"
+    parts = text.split(":")
+    if len(parts) == 1:
+        return AxisCfg(name, tuple(_value(part.strip(), name, remedy) for part in text.split(",")))
+    if len(parts) > 3:
+        raise ConfigError(name, text, remedy)
+    try:
+        low, high = float(parts[0]), float(parts[1])
+        count = int(parts[2]) if len(parts) == 3 else 0
+    except ValueError as error:
+        raise ConfigError(name, text, remedy) from error
+    if len(parts) == 3 and low == high and count == 1:
+        return AxisCfg(name, (low,))
+    if len(parts) == 3 and count < 2:
+        raise ConfigError(name, text, "a count of 2 or more")
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise ConfigError(name, text, "finite numbers with low below high")
+    return AxisCfg(name, low=low, high=high, count=count)
+
+
+def _value(text: str, name: str, remedy: str) -> AxisValue:
+    if not text:
+        raise ConfigError(name, text, remedy)
+    if text in ("true", "false"):
+        return text == "true"
+    if name == "level":
+        try:
+            return int(text)
+        except ValueError as error:
+            raise ConfigError(name, text, "whole numbers of 0 to 4") from error
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    if not math.isfinite(number):
+        raise ConfigError(name, text, "finite numbers")
+    return number
+
+
+def _kind(value: AxisValue) -> type[AxisValue]:
+    return float if isinstance(value, int) and not isinstance(value, bool) else type(value)
+
+
+def _join(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """Deep union of two nested mappings."""
+    joined = dict(one)
+    for key, value in other.items():
+        both = isinstance(value, dict) and isinstance(joined.get(key), dict)
+        joined[key] = _join(joined[key], value) if both else value
+    return joined

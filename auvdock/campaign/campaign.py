@@ -1,0 +1,149 @@
+"""Run a campaign: plan, executor and store together."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from auvdock.campaign.config import CampaignCfg
+from auvdock.campaign.errors import CampaignError
+from auvdock.campaign.executor import Executor, peak_rss_mb
+from auvdock.campaign.job import Job
+from auvdock.campaign.plan import Plan
+from auvdock.campaign.row import Row
+from auvdock.campaign.statistics import Rate, wilson
+from auvdock.campaign.store import Store, read_table
+
+__all__ = ["CampaignObserver", "CampaignSummary", "Tally", "run_campaign"]
+
+ROUND_EPISODES = 100
+"""With `until_ci`, episodes between two looks at the interval (or a whole grid, if that is more)."""
+CRASHES = 10
+"""If this many episodes have ended and all of them crashed, the campaign stops."""
+
+
+@dataclass
+class Tally:
+    """Running counts."""
+
+    episodes: int = 0
+    successes: int = 0
+    crashes: int = 0
+
+    def add(self, success: bool, crashed: bool) -> None:
+        """Count one episode."""
+        self.episodes += 1
+        self.successes += success
+        self.crashes += crashed
+
+    @property
+    def rate(self) -> Rate:
+        """Success rate with its Wilson 95 % interval."""
+        return wilson(self.successes, self.episodes)
+
+
+class CampaignObserver(Protocol):
+    """Watches a campaign."""
+
+    def on_start(self, planned: int, tally: Tally) -> None:
+        """Called once; `tally` holds what earlier sessions finished."""
+        ...
+
+    def on_row(self, row: Row, tally: Tally) -> None:
+        """Called after each episode is stored."""
+        ...
+
+    def close(self) -> None:
+        """Called once, however it ends."""
+        ...
+
+
+@dataclass(frozen=True)
+class CampaignSummary:
+    """A campaign's outcome.
+
+    Attributes:
+        rate: over all its finished episodes.
+        failures: failed episodes by cause.
+        ran: episodes run by this call, the others were there.
+        wall_s: wall-clock time of this call.
+        peak_rss_mb: this process's peak memory plus each worker's own peak.
+    """
+
+    rate: Rate
+    failures: dict[str, int]
+    ran: int
+    wall_s: float
+    peak_rss_mb: float
+
+
+def run_campaign(
+    cfg: CampaignCfg, job: Job, store: Store, executor: Executor, observer: CampaignObserver
+) -> CampaignSummary:
+    """Run the episodes that the store lacks.
+
+    With `until_ci` the campaign goes on in rounds and stops after the first round whose prefix of episodes has an
+    interval narrow enough (the fixed-width sequential interval of Chow and Robbins 1965). Rounds end before the next
+    one begins, so the episodes that are run do not depend on the number of workers.
+
+    Raises:
+        CampaignError: the store cannot be written, workers do not start, or all first episodes crash.
+        ConfigError: a configuration that some episode refuses.
+    """
+    started = time.perf_counter()
+    plan = Plan(cfg)
+    tally = Tally()
+    outcomes: dict[int, bool] = {}
+    for row in read_table(store.folder).select(["episode", "success", "failure_reason"]).to_pylist():
+        outcomes[row["episode"]] = row["success"]
+        tally.add(row["success"], row["failure_reason"] == "crashed")
+    ran = 0
+    observer.on_start(len(plan), tally)
+    try:
+        for episodes in _rounds(plan, outcomes):
+            pending = [episode for episode in episodes if episode not in outcomes]
+            if not pending:
+                continue
+            if not ran:
+                executor.start(job)
+            for row in executor.run(plan[episode] for episode in pending):
+                store.add(row)
+                outcomes[int(row["episode"] or 0)] = bool(row["success"])
+                tally.add(bool(row["success"]), row["failure_reason"] == "crashed")
+                ran += 1
+                observer.on_row(row, tally)
+                if tally.crashes == tally.episodes == CRASHES:
+                    raise CampaignError(f"all of the first {CRASHES} episodes crashed: {row['error']}")
+    except BaseException:
+        store.abandon()
+        raise
+    finally:
+        executor.close()
+        observer.close()
+    store.close()
+    reasons = Counter(read_table(store.folder).column("failure_reason").drop_null().to_pylist())
+    return CampaignSummary(
+        rate=tally.rate,
+        failures=dict(reasons.most_common()),
+        ran=ran,
+        wall_s=time.perf_counter() - started,
+        peak_rss_mb=peak_rss_mb() + executor.peak_rss_mb,
+    )
+
+
+def _rounds(plan: Plan, outcomes: dict[int, bool]) -> Iterator[range]:
+    """Ranges of episodes, each to be finished before the next is asked for."""
+    if not plan.cfg.until_ci:
+        yield range(len(plan))
+        return
+    step = max(ROUND_EPISODES, plan.cells)
+    successes = 0
+    for start in range(0, len(plan), step):
+        end = min(start + step, len(plan))
+        yield range(start, end)
+        successes += sum(outcomes[episode] for episode in range(start, end))
+        if wilson(successes, end).half_width <= plan.cfg.until_ci:
+            return

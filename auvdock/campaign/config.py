@@ -1,0 +1,93 @@
+"""Configuration of a campaign, and its strict TOML file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from auvdock.campaign.axes import AxisCfg
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import from_mapping, load_toml
+from auvdock.episode.config import LEVELS, EpisodeCfg, level_cfg
+
+__all__ = ["SAMPLINGS", "STATIONS", "CampaignCfg", "campaign_from_plain", "load_campaign"]
+
+SAMPLINGS = ("random", "latin_hypercube", "sobol")
+"""How axes that are distributions are drawn."""
+STATIONS = ("conical",)
+"""Stations that campaigns can dock into."""
+
+
+@dataclass(frozen=True)
+class CampaignCfg:
+    """Many episodes of one task: what stays, what varies, how many, and from which seed."""
+
+    name: str = "campaign"
+    """Title of the report."""
+    station: str = "conical"
+    """Docking station."""
+    level: int = 1
+    """Difficulty level that all episodes start from, unless an axis named "level" varies it."""
+    episodes: int = 100
+    """Episodes; with `until_ci` the most that are run."""
+    seed: int = 0
+    """Decides every episode's seed and every draw."""
+    sampling: str = "random"
+    """How drawn axes are sampled: "random", "latin_hypercube" or "sobol"."""
+    until_ci: float = 0.0
+    """Stop once the success rate's 95 % interval is no wider than plus or minus this; 0 runs all episodes."""
+    episode_limit_s: float = 600.0
+    """Wall-clock limit of one episode; past it the episode counts as `hung`."""
+    axes: tuple[AxisCfg, ...] = ()
+    """What varies. Grid axes are crossed with each other; drawn axes are drawn anew for each episode."""
+    episode: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """Changes of the level's settings that all episodes share, nested as in an episode's TOML file."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be run, before anything is run."""
+        if self.station not in STATIONS:
+            raise ConfigError("station", self.station, f"one of {', '.join(STATIONS)}")
+        if self.sampling not in SAMPLINGS:
+            raise ConfigError("sampling", self.sampling, f"one of {', '.join(SAMPLINGS)}")
+        for name, least in (("episodes", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise ConfigError(name, getattr(self, name), f"a whole number of {least} or more")
+        if not 0.0 <= self.until_ci < 0.5:
+            raise ConfigError("until_ci", self.until_ci, "half an interval's width, above 0 and below 0.5, or 0")
+        if not self.episode_limit_s > 0.0:
+            raise ConfigError("episode_limit_s", self.episode_limit_s, "a time above 0 s")
+        names = [axis.name for axis in self.axes]
+        if len(set(names)) != len(names):
+            raise ConfigError("axes", names, "each axis once")
+        base = self.base(self.level)
+        for axis in self.axes:
+            ends = axis.grid or (axis.quantile(0.0), axis.quantile(1.0))
+            for value in ends:
+                if axis.name == "level" and value not in LEVELS:
+                    raise ConfigError("axes.level", value, f"one of {', '.join(map(str, LEVELS))}")
+                base.override(axis.changes(value))
+
+    def base(self, level: int) -> EpisodeCfg:
+        """What all episodes of a level share.
+
+        Raises:
+            ConfigError: no such level, or changes that do not fit.
+        """
+        return level_cfg(level).override(self.episode)
+
+
+def load_campaign(path: Path) -> CampaignCfg:
+    """Read a campaign's TOML file.
+
+    Raises:
+        ConfigError: the file cannot be read, has an unknown key or a value that does not fit.
+    """
+    return load_toml(CampaignCfg, path)
+
+
+def campaign_from_plain(data: Mapping[str, Any]) -> CampaignCfg:
+    """The campaign that a manifest holds; the inverse of `auvdock.core.strict.to_plain`."""
+    axes = [{key: value for key, value in axis.items() if value is not None} for axis in data.get("axes", ())]
+    return from_mapping(CampaignCfg, {**data, "axes": axes})

@@ -1,0 +1,252 @@
+"""`auvdock sweep`: a Monte Carlo campaign over currents, turbidity and whatever else varies."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from auvdock.campaign.axes import AxisCfg, parse_axis
+from auvdock.campaign.campaign import CampaignSummary, run_campaign
+from auvdock.campaign.config import CampaignCfg, load_campaign
+from auvdock.campaign.executor import Executor, SerialExecutor
+from auvdock.campaign.job import DockingJob
+from auvdock.campaign.plan import Plan
+from auvdock.campaign.process import ProcessExecutor, usable_cores
+from auvdock.campaign.provenance import manifest_of
+from auvdock.campaign.store import Store, read_campaign
+from auvdock.cli.parsing import base_config, parse
+from auvdock.cli.sweep_progress import SweepProgress
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import to_plain
+from auvdock.episode.config import EpisodeCfg, level_cfg
+
+__all__ = ["Sweep", "run"]
+
+AXIS_FLAGS = (
+    "attenuation",
+    "current",
+    "current_direction",
+    "gust",
+    "water",
+    "flicker",
+    "interfering_lights",
+    "detector",
+)
+"""Flags that may vary; `--axis` takes any other setting."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Run many episodes over a grid or a distribution of conditions, and store one row each.
+
+    A range is low:high:count for a grid, low:high to draw from a distribution, or values with commas between them. Grid
+    axes are crossed with each other.
+
+    Exit code: 0 all episodes have run, 2 input that cannot be used or a store that cannot be written.
+    """
+
+    out: Path
+    """Folder of the campaign: manifest, rows as Parquet shards, later the report."""
+    campaign: Path | None = None
+    """Campaign as a TOML file (see experiments/campaigns); the flags below change single things of it."""
+    station: Literal["conical"] | None = None
+    """Docking station."""
+    episodes: int | None = None
+    """Number of episodes (100 if no campaign file says otherwise)."""
+    seed: int | None = None
+    """Decides every episode's seed and every draw (0 if no campaign file says otherwise)."""
+    executor: Literal["serial", "process", "ray"] = "process"
+    """Where episodes run: here one by one, in local processes, or on a Ray cluster."""
+    workers: int | None = None
+    """Episodes at the same time; by default one per core, on a cluster all of its cores."""
+    address: str | None = None
+    """Address of a Ray cluster; by default one is started on this machine."""
+    resume: bool = False
+    """Go on with the campaign in --out; without other flags it is taken as it was begun."""
+    until_ci: float | None = None
+    """Stop once the success rate's 95 % interval is no wider than plus or minus this."""
+    sampling: Literal["random", "latin_hypercube", "sobol"] | None = None
+    """How axes that are distributions are drawn."""
+    episode_limit: float | None = None
+    """Wall-clock limit of an episode in s; past it the episode counts as hung (600 by default)."""
+    json: bool = False
+    """Print the summary as one JSON object and nothing else."""
+    level: str | None = None
+    """Difficulty level 0 to 4, or several: 0,1,2."""
+    fidelity: Literal["pixels", "beacons"] | None = None
+    """pixels renders every frame; beacons draws detections from the same light model without an image."""
+    attenuation: str | None = None
+    """Beam attenuation at 450 nm in 1/m: value or range."""
+    current: str | None = None
+    """Speed of the current in m/s: value or range."""
+    current_direction: str | None = None
+    """Where the current flows to in degrees: value, range or "random"."""
+    gust: str | None = None
+    """Standard deviation of the gusts in m/s: value or range."""
+    water: str | None = None
+    """Water preset, or several with commas."""
+    flicker: str | None = None
+    """Flicker of the lamps: none, mild, moderate, severe, or several with commas."""
+    interfering_lights: str | None = None
+    """Lights that are not the station's: none, mild, moderate, severe, or several with commas."""
+    detector: str | None = None
+    """threshold, blob, your own as package.module:Name, or several with commas."""
+    axis: tuple[str, ...] = ()
+    """Further axes as NAME=RANGE; a name is a short one or a dotted setting such as world.start.heading_deg."""
+    config: Path | None = None
+    """TOML file with further settings of the episodes, on top of the level."""
+    episode: Annotated[EpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=EpisodeCfg)
+
+    def axes(self) -> list[AxisCfg]:
+        """The axes that the flags ask for.
+
+        Raises:
+            ConfigError: a range that cannot be read.
+        """
+        found: list[AxisCfg] = []
+        for name in AXIS_FLAGS:
+            text = getattr(self, name)
+            if text is not None and text != "random":
+                found.append(parse_axis(name, text))
+        for text in self.axis:
+            name, equals, values = text.partition("=")
+            if not equals:
+                raise ConfigError("axis", text, "NAME=RANGE, for example world.start.heading_deg=0:60:4")
+            found.append(parse_axis(name, values))
+        if self.level is not None and "," in self.level:
+            found.append(parse_axis("level", self.level))
+        return found
+
+
+def run(argv: Sequence[str], prog: str) -> int:
+    """Run the command."""
+    asked_help = bool({"-h", "--help"} & set(argv))
+    base = EpisodeCfg() if asked_help else base_config(_single_level(argv))
+    args = parse(Sweep, argv, prog, dataclasses.replace(_defaults(), episode=base))
+    cfg = _resolve(args, base)
+    if args.workers is not None and args.workers < 1:
+        raise ConfigError("workers", args.workers, "a whole number of 1 or more")
+    Plan(cfg).config(Plan(cfg)[0])
+    executor = _executor(args, cfg)
+    store = Store(args.out, cfg, manifest_of(cfg), args.resume)
+    observer = SweepProgress(Console(stderr=True), executor.workers, quiet=args.json)
+    summary = run_campaign(cfg, DockingJob(cfg), store, executor, observer)
+    if args.json:
+        print(json.dumps(_plain(summary), allow_nan=False))
+    else:
+        _print(summary, args.out)
+    return 0
+
+
+def _defaults() -> Sweep:
+    return Sweep(out=tyro.MISSING)
+
+
+def _single_level(argv: Sequence[str]) -> list[str]:
+    """The words with `--level 0,1,2` taken out: then each level is applied later, the base is none of them."""
+    words = list(argv)
+    for place, word in enumerate(words):
+        if word == "--level" and place + 1 < len(words) and "," in words[place + 1]:
+            return words[:place] + words[place + 2 :]
+        if word.startswith("--level=") and "," in word:
+            return words[:place] + words[place + 1 :]
+    return words
+
+
+def _resolve(args: Sweep, base: EpisodeCfg) -> CampaignCfg:
+    changes = _difference(to_plain(_start(args)), to_plain(args.episode))
+    axes = args.axes()
+    if args.fidelity is not None:
+        changes.setdefault("world", {})["fidelity"] = args.fidelity
+    if args.current_direction == "random":
+        changes.setdefault("world", {}).setdefault("start", {})["random_current_direction"] = True
+    plain: dict[str, Any] = {
+        name: getattr(args, name)
+        for name in ("station", "episodes", "seed", "until_ci", "sampling")
+        if getattr(args, name) is not None
+    }
+    if args.episode_limit is not None:
+        plain["episode_limit_s"] = args.episode_limit
+    if args.level is not None and "," not in args.level:
+        plain["level"] = int(args.level)
+    asked = bool(plain or changes or axes or args.campaign)
+    if args.resume and not asked:
+        return read_campaign(args.out)
+    if args.campaign is None:
+        return CampaignCfg(**plain, axes=tuple(axes), episode=changes)
+    there = load_campaign(args.campaign)
+    kept = [axis for axis in there.axes if axis.name not in {axis.name for axis in axes}]
+    return dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=_deep({**there.episode}, changes))
+
+
+def _start(args: Sweep) -> EpisodeCfg:
+    """What the flags' changes are relative to: the level that the campaign applies again to each episode."""
+    return level_cfg(int(args.level) if args.level is not None and "," not in args.level else 1)
+
+
+def _difference(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
+    """Nested mapping of what differs."""
+    changes: dict[str, Any] = {}
+    for name, value in after.items():
+        old = before[name]
+        if isinstance(value, dict) and isinstance(old, dict):
+            inner = _difference(old, value)
+            if inner:
+                changes[name] = inner
+        elif value != old:
+            changes[name] = value
+    return changes
+
+
+def _deep(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    for name, value in other.items():
+        both = isinstance(value, dict) and isinstance(one.get(name), dict)
+        one[name] = _deep({**one[name]}, value) if both else value
+    return one
+
+
+def _executor(args: Sweep, cfg: CampaignCfg) -> Executor:
+    if args.executor == "serial":
+        return SerialExecutor(cfg.episode_limit_s)
+    if args.executor == "ray":
+        from auvdock.campaign.ray_executor import RayExecutor
+
+        return RayExecutor(args.workers, cfg.episode_limit_s, args.address)
+    return ProcessExecutor(min(args.workers or usable_cores(), cfg.episodes), cfg.episode_limit_s)
+
+
+def _plain(summary: CampaignSummary) -> dict[str, Any]:
+    return {
+        "success_rate": summary.rate.rate,
+        "ci_low": summary.rate.low,
+        "ci_high": summary.rate.high,
+        "episodes": summary.rate.episodes,
+        "failures": summary.failures,
+        "wall_s": summary.wall_s,
+        "peak_rss_mb": summary.peak_rss_mb,
+    }
+
+
+def _print(summary: CampaignSummary, out: Path) -> None:
+    table = Table(title=f"campaign of {summary.rate.episodes} episodes", title_justify="left")
+    table.add_column("metric")
+    table.add_column("value", justify="right")
+    rate = summary.rate
+    table.add_row("success rate", f"{100.0 * (rate.rate or 0.0):.1f} %")
+    table.add_row("95 % interval (Wilson)", f"{100.0 * rate.low:.1f} to {100.0 * rate.high:.1f} %")
+    for cause, count in summary.failures.items():
+        table.add_row(f"failed: {cause}", str(count))
+    table.add_row("run now", str(summary.ran))
+    table.add_row("wall-clock time", f"{summary.wall_s:.0f} s")
+    table.add_row("peak memory", f"{summary.peak_rss_mb:.0f} MiB")
+    console = Console()
+    console.print(table)
+    console.print(f"next: auvdock report {out}", highlight=False)
