@@ -76,15 +76,22 @@ class ThrustAllocator:
         """
         return self.solve(wrench_body, surge_m_s)[0]
 
-    def solve(self, wrench_body: Array, surge_m_s: float) -> tuple[Array, Array]:
-        """As `allocate`, with the wrench (6,) that the commands give, dead band apart: what anti-windup needs."""
+    def solve(self, wrench_body: Array, surge_m_s: float, moments_first: bool = False) -> tuple[Array, Array]:
+        """As `allocate`, with the wrench (6,) that the commands give, dead band apart: what anti-windup needs.
+
+        Args:
+            wrench_body: wanted wrench.
+            surge_m_s: forward speed through the water.
+            moments_first: a group out of reach gives its moments in full and as much of its forces as is left, instead
+                of a share of both: a hull that cannot be held against a cross-current must still turn into it.
+        """
         check_shape("wrench_body", wrench_body, (6,))
         wanted: list[float] = wrench_body.tolist()
         achieved = [0.0] * 6
         values = [0.0] * len(self._dead_band)
         effect = surge_m_s * abs(surge_m_s)
         for group in self._groups:
-            commands = group.solve(wanted, effect)
+            commands = group.solve(wanted, effect, moments_first)
             group.add_wrench(achieved, commands, effect)
             for column, value in zip(group.columns, commands, strict=True):
                 band = self._dead_band[column]
@@ -120,11 +127,20 @@ class _Group:
             thrusters = (thrusters[0], 0.0, 1.0)
         self._grams = (thrusters, moving)
 
-    def solve(self, wrench: Sequence[float], fin_effect: float) -> list[float]:
+    def solve(self, wrench: Sequence[float], fin_effect: float, moments_first: bool = False) -> list[float]:
         """Commands for the group's part of the wrench, or for the longest part of it within reach."""
         commands = self._least(wrench, fin_effect)
         if max(commands) <= 1.0 and min(commands) >= -1.0:
             return commands
+        if moments_first and self.rows[0] < 3 <= self.rows[-1]:
+            turning = self._least([0.0, 0.0, 0.0, *wrench[3:]], fin_effect)
+            if max(turning) <= 1.0 and min(turning) >= -1.0:
+                share = 1.0
+                for whole, turn in zip(commands, turning, strict=True):
+                    push = whole - turn
+                    if abs(whole) > 1.0:
+                        share = min(share, (math.copysign(1.0, push) - turn) / push)
+                return [turn + share * (whole - turn) for whole, turn in zip(commands, turning, strict=True)]
         return _longest(commands, _null_vector(self._scaled(fin_effect)))
 
     def add_wrench(self, wrench: list[float], commands: list[float], fin_effect: float) -> None:

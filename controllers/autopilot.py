@@ -35,7 +35,7 @@ class AutopilotCfg:
     """Heading and pitch errors beyond this count as this much: large turns run at a bounded rate."""
     force_share: float = 0.85
     """Part of an axis' thrust that its force loop may use; the rest of shared thrusters is left to the moments."""
-    moment_share: float = 0.7
+    moment_share: float = 0.95
     """Part of an axis' greatest moment that its loop may use."""
     current_time_constant_s: float = 2.0
     """Smoothing of the measured water velocity for feed-forward."""

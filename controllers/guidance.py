@@ -8,6 +8,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from auvdock.controllers.allocation import ThrustAllocator
+from auvdock.controllers.linear_model import hydrodynamic_wrench
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import VehicleCfg
 
@@ -24,6 +28,8 @@ class GuidanceCfg:
     """Speed over ground on the axis with a pose (paper A: 0.5 m/s)."""
     entry_speed_m_s: float = 0.5
     """Speed over ground through mouth and throat."""
+    tube_speed_m_s: float = 0.3
+    """Speed over ground past the throat, where the latch will catch the vehicle."""
     back_speed_m_s: float = 0.4
     """Speed over ground while backing off."""
     fast_beyond_m: float = 8.0
@@ -48,13 +54,23 @@ class GuidanceCfg:
     """Where the corridor begins to widen."""
     corridor_slope: float = 0.35
     """How fast it widens with distance."""
-    sway_share: float = 0.65
-    """Part of the lateral thrust that may go into holding against a cross-current before the hull is crabbed."""
-    max_crab_rad: float = 0.35
-    """Greatest crab angle far from the mouth."""
-    max_entry_crab_rad: float = 0.1
-    """Greatest crab angle at the mouth; the latch allows 10°."""
-    max_view_angle_rad: float = 0.45
+    sway_share: float = 0.8
+    """Part of the lateral actuators' range that may go into holding against a cross-current before the hull crabs."""
+    max_crab_rad: float = 0.5
+    """Greatest crab angle up to the mouth."""
+    max_entry_crab_rad: float = 0.08
+    """Greatest crab angle at the throat; the latch allows 10°."""
+    straighten_rad_m: float = 0.25
+    """How fast the crab angle falls along the last way in."""
+    straight_share: float = 0.4
+    """Part of the funnel after which the hull shall be straight."""
+    rush_speed_m_s: float = 0.85
+    """Speed over ground through the mouth in a cross-current beyond the sway thrusters' reach."""
+    min_way_m_s: float = 0.35
+    """Least forward speed on the axis in such a current, outside the corridor too."""
+    rush_excess_m_s: float = 0.15
+    """Cross-current beyond reach at which the speed is risen to that."""
+    max_view_angle_rad: float = 0.5
     """The hull turns towards the mouth as far as needed to keep it within this angle of the bow."""
 
     def __post_init__(self) -> None:
@@ -106,20 +122,25 @@ def approach_speed(distance_m: float, off_axis_m: float, cfg: GuidanceCfg) -> fl
     return speed * min(1.0, max(0.0, 2.0 - off_axis_m / allowed))
 
 
-def sway_reach_m_s(vehicle: VehicleCfg, surge_m_s: float, share: float) -> float:
-    """Sideways speed through the water at which drag and lift take `share` of the lateral thrust.
+def sway_reach_m_s(vehicle: VehicleCfg, allocator: ThrustAllocator, surge_m_s: float, share: float) -> float:
+    """Sideways speed through the water that lateral actuators can hold with `share` of their range.
 
-    Positive root of |Y_vv| v² + |Y_uv| u v = share × Σ|Y|.
+    Solves max |c(v)| = share for v by bisection, c(v) being the commands that balance the hull's sideways drag and lift
+    and its yaw moment at (surge, v): the Munk moment loads one thruster more than the other, so force alone will not
+    do for a measure.
     """
-    effect = vehicle.thruster_wrenches_body
-    thrust = sum(
-        abs(float(effect[1, index])) for index, actuator in enumerate(vehicle.actuators) if actuator.kind == "thruster"
-    )
-    square = abs(float(vehicle.quadratic_damping_body[1, 1]))
-    linear = abs(float(vehicle.lift_damping_body[1, 1])) * surge_m_s + abs(float(vehicle.linear_damping_body[1, 1]))
-    if square < 1e-9:
-        return share * thrust / linear if linear > 1e-9 else math.inf
-    return (math.sqrt(linear * linear + 4.0 * square * share * thrust) - linear) / (2.0 * square)
+
+    def load(sway_m_s: float) -> float:
+        water = hydrodynamic_wrench(vehicle, np.array([surge_m_s, sway_m_s, 0.0, 0.0, 0.0, 0.0]))
+        wanted = np.array([0.0, -water[1], 0.0, 0.0, 0.0, -water[5]]) / share
+        _, given = allocator.solve(wanted, surge_m_s)
+        return float(np.abs(wanted - given).max())
+
+    low, high = 0.0, 2.0
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if load(middle) < 1e-6 else (low, middle)
+    return low
 
 
 def crab_angle(forward_m_s: float, port_m_s: float, reach_m_s: float, limit_rad: float) -> float:

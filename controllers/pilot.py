@@ -144,8 +144,9 @@ class ConicalPilot:
         entrance = layout.indices("entrance")
         centre = layout.positions_m[list(entrance)].mean(axis=0) if entrance else np.array([-1.0, 0.0, 0.0])
         self._entrance_m: Vector = (float(centre[0]), float(centre[1]), float(centre[2]))
+        self._funnel_length_m = station.funnel.length_m
         self._has_entrance = bool(entrance)
-        self._reach_m_s = sway_reach_m_s(vehicle, cfg.guidance.mid_speed_m_s, cfg.guidance.sway_share)
+        self._reach_m_s = sway_reach_m_s(vehicle, self.allocator, cfg.guidance.mid_speed_m_s, cfg.guidance.sway_share)
         self._pattern = search_pattern(cfg.search)
         self._idle = np.zeros(len(vehicle.actuators))
 
@@ -311,7 +312,9 @@ class ConicalPilot:
                 place,
                 state.integrals,
                 mode == MID and (at_gate or (blind and place.distance_m < cfg.modes.commit_distance_m + 1.0)),
+                mode != MID,
                 cfg.guidance.lookahead_mid_m if mode == MID else cfg.guidance.lookahead_near_m,
+                self._funnel_length_m,
                 senses,
                 current,
                 self._reach_m_s,
@@ -335,7 +338,7 @@ class ConicalPilot:
         """Autopilot, allocation, and the log entry."""
         point = steering.setpoint
         wrench, loops = self.autopilot.advance(state.autopilot, point, senses)
-        values, achieved = self.allocator.solve(wrench, senses.water_m_s[0])
+        values, achieved = self.allocator.solve(wrench, senses.water_m_s[0], moments_first=True)
         loops = self.autopilot.settle(loops, wrench, achieved)
         log = {
             "surge_m_s": point.surge_m_s,

@@ -178,7 +178,7 @@ def towards_light(
     climb = max(speed, 0.3) * math.tan(min(0.7, max(-0.7, sight.elevation_rad - wanted)))
     climb = _clip(climb, cfg.max_vertical_speed_m_s)
     setpoint, offset = _ground_course(
-        speed, 0.0, climb, sight.azimuth_rad, 0.0, cfg.max_crab_rad, senses, current_m_s, reach_m_s
+        speed, 0.0, climb, sight.azimuth_rad, cfg.max_crab_rad, senses, current_m_s, reach_m_s
     )
     return Steering(setpoint, offset_rad=offset)
 
@@ -187,7 +187,9 @@ def along_axis(
     place: Place,
     integrals: tuple[float, float],
     hold: bool,
+    committed: bool,
     lookahead_m: float,
+    funnel_length_m: float,
     senses: Senses,
     current_m_s: Vector,
     reach_m_s: float,
@@ -198,7 +200,8 @@ def along_axis(
     """Along the approach axis: integral line of sight sideways and vertically, hull aligned but for crab.
 
     Cross-track speeds are U sin χ with χ from `guidance.ilos`; the forward speed is `guidance.approach_speed`, 0 while
-    `hold`. Crab fades from `max_crab_rad` at the standoff to `max_entry_crab_rad` at the mouth.
+    `hold`. Crab fades from `max_crab_rad` at the mouth to `max_entry_crab_rad` at the throat. A cross-current beyond
+    the sway thrusters' reach raises the speed once `committed`: at more speed the same current needs less crab.
     """
     port_angle, port_integral = ilos(place.port_m, integrals[0], lookahead_m, guidance.integral_gain, dt_s)
     up_angle, up_integral = ilos(place.up_m, integrals[1], lookahead_m, guidance.integral_gain, dt_s)
@@ -210,17 +213,24 @@ def along_axis(
     up = _clip(guidance.cross_speed_m_s * math.sin(up_angle), bound)
     forward = approach_speed(place.distance_m, place.off_axis_m, guidance)
     if place.distance_m < modes.mouth_m:
-        forward = guidance.entry_speed_m_s
+        past = place.distance_m < -funnel_length_m
+        forward = guidance.tube_speed_m_s if past else guidance.entry_speed_m_s
     elif hold:
         forward = _clip(0.3 * (place.distance_m - modes.gate_distance_m), 0.2)
-    blend = min(1.0, max(0.0, place.distance_m / modes.standoff_m))
-    limit = guidance.max_entry_crab_rad + blend * max(0.0, guidance.max_crab_rad - guidance.max_entry_crab_rad)
-    look = 0.0
+    across = abs(current_m_s[1] * math.cos(place.axis_yaw_rad) - current_m_s[0] * math.sin(place.axis_yaw_rad))
+    excess = min(1.0, max(0.0, (across - reach_m_s) / guidance.rush_excess_m_s))
+    if excess > 0.0 and committed:
+        forward += excess * (guidance.rush_speed_m_s - forward)
+    elif excess > 0.0 and not hold:  # without way on, the hull could not hold its place by crabbing
+        forward = max(forward, excess * guidance.min_way_m_s)
+    # The hull turns straight on its way through the funnel.
+    turning = guidance.straighten_rad_m * max(0.0, place.distance_m + guidance.straight_share * funnel_length_m)
+    limit = min(guidance.max_crab_rad, guidance.max_entry_crab_rad + turning)
+    bearing, view = 0.0, math.pi
     if place.distance_m > 1.0:
-        bearing = math.atan2(-place.port_m, place.distance_m)
-        look = bearing - _clip(bearing, guidance.max_view_angle_rad)
+        bearing, view = math.atan2(-place.port_m, place.distance_m), guidance.max_view_angle_rad
     setpoint, offset = _ground_course(
-        forward, port, up, place.axis_yaw_rad, look, limit, senses, current_m_s, reach_m_s
+        forward, port, up, place.axis_yaw_rad, limit, senses, current_m_s, reach_m_s, (bearing - view, bearing + view)
     )
     return Steering(setpoint, port_integral, up_integral, offset)
 
@@ -232,7 +242,7 @@ def back_off(place: Place, senses: Senses, current_m_s: Vector, reach_m_s: float
         port = _clip(-0.25 * place.port_m, cfg.max_cross_speed_m_s)
         up = _clip(-0.25 * place.up_m, cfg.max_cross_speed_m_s)
     setpoint, offset = _ground_course(
-        -cfg.back_speed_m_s, port, up, place.axis_yaw_rad, 0.0, 0.0, senses, current_m_s, reach_m_s
+        -cfg.back_speed_m_s, port, up, place.axis_yaw_rad, 0.0, senses, current_m_s, reach_m_s
     )
     return Steering(setpoint, offset_rad=offset)
 
@@ -242,19 +252,23 @@ def _ground_course(
     port_m_s: float,
     up_m_s: float,
     course_rad: float,
-    look_rad: float,
     crab_limit_rad: float,
     senses: Senses,
     current_m_s: Vector,
     reach_m_s: float,
+    view_rad: tuple[float, float] = (-math.pi, math.pi),
 ) -> tuple[AutopilotSetpoint, float]:
-    """Set-point for a velocity over ground given along and across a world direction, and the heading offset in it."""
+    """Set-point for a velocity over ground given along and across a world direction, and the heading offset in it.
+
+    The offset is the crab angle, kept within `view_rad` so that the lights stay in the image.
+    """
     cosine, sine = math.cos(course_rad), math.sin(course_rad)
     along = current_m_s[0] * cosine + current_m_s[1] * sine
     across = -current_m_s[0] * sine + current_m_s[1] * cosine
-    offset = look_rad
+    offset = 0.0
     if crab_limit_rad > 0.0:
-        offset += crab_angle(forward_m_s - along, port_m_s - across, reach_m_s, crab_limit_rad)
+        offset = crab_angle(forward_m_s - along, port_m_s - across, reach_m_s, crab_limit_rad)
+    offset = min(view_rad[1], max(view_rad[0], offset))
     turn = math.remainder(senses.yaw_rad - course_rad, math.tau)
     cosine, sine = math.cos(turn), math.sin(turn)
     surge = forward_m_s * cosine + port_m_s * sine
