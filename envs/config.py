@@ -70,6 +70,8 @@ class WorldCfg:
     """Water preset: Jerlov "I" to "9C", "clear", "pool", "lake"."""
     attenuation_per_m: float | None = None
     """Beam attenuation c at 450 nm in 1/m in place of the preset's."""
+    detection_model: str | None = None
+    """TOML file of a fitted detection model for the beacons fidelity, in place of the detector's own."""
     station: ConicalStationCfg = field(default_factory=load_conical_station)
     sim: SimCfg = SimCfg()
     camera: CameraCfg = CameraCfg()

@@ -5,15 +5,20 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from auvdock.assets import asset_names
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera, make_camera
 from auvdock.core.contracts import Detections, Frame, Proprioception
+from auvdock.core.errors import ConfigError
 from auvdock.core.marine import flip_vector
+from auvdock.core.strict import load_toml
 from auvdock.core.transforms import quat_wxyz_from_euler_zyx
 from auvdock.envs.config import StartCfg, WorldCfg
+from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.sensing import BeaconSensor
 from auvdock.optics.water import load_water, with_attenuation
@@ -79,7 +84,9 @@ class DockingWorld:
             self.simulator.T_world_station,
         )
         self.imager = UnderwaterCamera(*optics, scene=self.simulator)
-        self._beacon_sensor = BeaconSensor(*optics, detector) if cfg.fidelity == "beacons" else None
+        self._beacon_sensor: BeaconSensor | None = None
+        if cfg.fidelity == "beacons":
+            self._beacon_sensor = BeaconSensor(*optics, detector, model=_detection_model(cfg, detector))
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)
         self._steps_per_frame = round(cfg.sim.physics_hz / cfg.camera.rate_hz)
         self._step_count = 0
@@ -145,6 +152,15 @@ class DockingWorld:
     def close(self) -> None:
         """Release the renderer."""
         self.imager.close()
+
+
+def _detection_model(cfg: WorldCfg, detector: str) -> DetectionModelCfg:
+    if cfg.detection_model is not None:
+        return load_toml(DetectionModelCfg, Path(cfg.detection_model))
+    if detector not in asset_names("detection"):
+        remedy = "world.detection_model a file that `auvdock fit-detector` wrote for it, or fidelity 'pixels'"
+        raise ConfigError("detector", detector, f"{remedy}: the beacons fidelity knows only fitted detectors")
+    return load_detection_model(detector)
 
 
 def bow_camera(cfg: WorldCfg, simulator: Simulator) -> Camera:
