@@ -83,7 +83,7 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
         partner = match[good]
         snr = lights.contrast_dn[good] / lights.noise_dn[good]
         errors.append(item.found.centre_px[partner] - lights.pixels[good])
-        blur.append(lights.width_px[good] / snr)
+        blur.append(lights.width_px[good] * (100.0 / lights.contrast_dn[good]) ** 2)
         score = np.clip(item.found.score[partner], 0.0, 0.999)
         gains.append(10.0 * score / (1.0 - score) / snr)
         wrong.append((item.found.class_id[partner] == 1) != lights.red[good])
@@ -100,7 +100,7 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
         merge_px=merge_px,
         merge_radii=merge_radii,
         centre_floor_px=floor,
-        centre_noise=noise,
+        centre_at_100=noise,
         score_gain=float(np.median(gain)) if len(gain) else 1.0,
         false_alarms=alarms / max(len(observations), 1),
         wrong_colour=float(np.mean(np.concatenate(wrong))) if len(gain) else 0.0,
@@ -181,16 +181,14 @@ def _fit_curve(contrast: Array, hit: BoolArray) -> tuple[float, float, float]:
 
 
 def _fit_spread(errors: Array, blur: Array) -> tuple[float, float]:
-    """Floor and noise factor by maximum likelihood, the worst 3 % left out as mismatches."""
+    """Floor and factor by maximum likelihood under a t distribution with 3 degrees of freedom: mismatches stay out."""
     if len(errors) < 20:
         return 0.1, 1.0
-    size = np.linalg.norm(errors, axis=1)
-    keep = size <= np.quantile(size, 0.97)
-    square, blur2 = (size[keep] ** 2) / 2.0, blur[keep] ** 2
+    square, blur2 = np.sum(errors**2, axis=1), blur**2
 
     def cost(x: Array) -> float:
         variance = math.exp(2.0 * x[0]) + math.exp(2.0 * x[1]) * blur2
-        return float(np.sum(np.log(variance) + square / variance))
+        return float(np.sum(np.log(variance) + 2.5 * np.log1p(square / (3.0 * variance))))
 
-    best = minimize(cost, np.array([math.log(0.05), 0.0]), method="Nelder-Mead")
+    best = minimize(cost, np.array([math.log(0.05), math.log(0.1)]), method="Nelder-Mead")
     return math.exp(float(best.x[0])), math.exp(float(best.x[1]))

@@ -45,8 +45,9 @@ class DetectionModelCfg:
     """In addition this many times the sum of the radii of their saturated discs."""
     centre_floor_px: float
     """Standard deviation of a bright light's centre, per axis."""
-    centre_noise: float
-    """In addition this times the spot's width over its signal-to-noise ratio."""
+    centre_at_100: float
+    """In addition this many widths of the spot at a contrast of 100; falls with the square of contrast, for a dim light
+    has noise as well as the slope of its neighbours' halos against it."""
     score_gain: float
     """Score = s / (s + 10) with s this times contrast over noise."""
     false_alarms: float
@@ -59,7 +60,7 @@ class DetectionModelCfg:
         for name in ("contrast_50_dn", "slope", "score_gain"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ConfigError(f"detection.{name}", getattr(self, name), "a number above 0")
-        for name in ("merge_px", "merge_radii", "centre_floor_px", "centre_noise", "false_alarms"):
+        for name in ("merge_px", "merge_radii", "centre_floor_px", "centre_at_100", "false_alarms"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ConfigError(f"detection.{name}", getattr(self, name), "0 or more")
         for name in ("ceiling", "wrong_colour"):
@@ -121,9 +122,11 @@ def draw_detections(
     hit = (chance[0] * found < model.ceiling) & (contrast > 0.0)
     index = hit.nonzero()[0]
     index = index[(-contrast[index]).argsort(kind="stable")]
-    snr = contrast[index] / merged.noise_dn[index]
+    strength = contrast[index]
+    snr = strength / merged.noise_dn[index]
     width = merged.width_px[index]
-    spread = width * (model.centre_noise / snr)
+    strength *= strength
+    spread = width * (model.centre_at_100 * 1e4 / strength)
     spread *= spread
     spread += model.centre_floor_px**2
     centre = noise[index]
