@@ -132,16 +132,13 @@ class _Group:
         commands = self._least(wrench, fin_effect)
         if max(commands) <= 1.0 and min(commands) >= -1.0:
             return commands
+        null = _null_vector(self._scaled(fin_effect))
+        idle = [0.0] * len(commands)
         if moments_first and self.rows[0] < 3 <= self.rows[-1]:
-            turning = self._least([0.0, 0.0, 0.0, *wrench[3:]], fin_effect)
-            if max(turning) <= 1.0 and min(turning) >= -1.0:
-                share = 1.0
-                for whole, turn in zip(commands, turning, strict=True):
-                    push = whole - turn
-                    if abs(whole) > 1.0:
-                        share = min(share, (math.copysign(1.0, push) - turn) / push)
-                return [turn + share * (whole - turn) for whole, turn in zip(commands, turning, strict=True)]
-        return _longest(commands, _null_vector(self._scaled(fin_effect)))
+            turning, reach = _longest(idle, self._least([0.0, 0.0, 0.0, *wrench[3:]], fin_effect), null)
+            if reach == 1.0:
+                return _longest(turning, self._least([*wrench[:3], 0.0, 0.0, 0.0], fin_effect), null)[0]
+        return _longest(idle, commands, null)[0]
 
     def add_wrench(self, wrench: list[float], commands: list[float], fin_effect: float) -> None:
         """Add the wrench of the commands."""
@@ -223,29 +220,33 @@ def _null_vector(effect: list[list[float]]) -> list[float] | None:
     return rows[-1].tolist() if count - rank == 1 else None
 
 
-def _longest(commands: list[float], null: list[float] | None) -> list[float]:
-    """Commands with |c| ≤ 1 that give λ times the wrench, λ ≤ 1 as great as it goes.
+def _longest(base: list[float], push: list[float], null: list[float] | None) -> tuple[list[float], float]:
+    """Commands c with |c| ≤ 1 and B c = B (base + λ push), λ ≤ 1 as great as it goes; and λ.
 
-    With one redundant actuator all solutions are λ a + t n, n spanning the null space: a linear programme in (λ, t),
-    solved pair by pair of limits. Otherwise the commands are scaled down, which with more redundancy may fall short of
-    the greatest λ.
+    With one redundant actuator all solutions are base + λ push + t n, n spanning the null space: a linear programme in
+    (λ, t), solved pair by pair of limits. Otherwise t is 0, which with more redundancy may fall short of the greatest
+    λ. `base` must be within reach.
     """
-    if null is None:
-        reach = 1.0 / max(abs(value) for value in commands)
-        return [min(1.0, max(-1.0, reach * value)) for value in commands]
     reach = 1.0
-    lines: list[tuple[float, float]] = []
-    for value, part in zip(commands, null, strict=True):
+    lines: list[tuple[float, float, float]] = []
+    for index, (start, step) in enumerate(zip(base, push, strict=True)):
+        part = null[index] if null is not None else 0.0
         if abs(part) > _TINY:
-            lines.append((1.0 / abs(part), value / part))
-        else:
-            reach = min(reach, 1.0 / max(abs(value), 1.0))
-    # Each moving command bounds t: -w - λ s <= t <= w - λ s with w = 1/|n|, s = a/n.
-    for width_i, slope_i in lines:
-        for width_j, slope_j in lines:
-            if (slope_j - slope_i) * reach > width_i + width_j:
-                reach = (width_i + width_j) / (slope_j - slope_i)
-    low = max(-width - reach * slope for width, slope in lines)
-    high = min(width - reach * slope for width, slope in lines)
-    shift = min(max(0.0, low), high)
-    return [min(1.0, max(-1.0, reach * value + shift * part)) for value, part in zip(commands, null, strict=True)]
+            lines.append((1.0 / abs(part), start / part, step / part))
+        elif abs(start + reach * step) > 1.0 and step != 0.0:
+            reach = max(0.0, (math.copysign(1.0, step) - start) / step)
+    # Each moving command bounds t: -w <= b + λ s + t <= w with w = 1/|n|, b = base/n, s = push/n.
+    for width_i, base_i, slope_i in lines:
+        for width_j, base_j, slope_j in lines:
+            room, slope = width_i + width_j + base_i - base_j, slope_j - slope_i
+            if slope * reach > room:
+                reach = max(0.0, room / slope)
+    shift = 0.0
+    if lines:
+        low = max(-width - start - reach * slope for width, start, slope in lines)
+        high = min(width - start - reach * slope for width, start, slope in lines)
+        shift = min(max(0.0, low), high)
+    commands = [start + reach * step for start, step in zip(base, push, strict=True)]
+    if null is not None:
+        commands = [command + shift * part for command, part in zip(commands, null, strict=True)]
+    return [min(1.0, max(-1.0, command)) for command in commands], reach
