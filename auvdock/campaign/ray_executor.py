@@ -6,6 +6,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
+from importlib import import_module
 from typing import Any
 
 from auvdock.campaign.errors import CampaignError
@@ -47,10 +48,10 @@ class RayExecutor:
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
         try:
-            import ray
+            ray: Any = import_module("ray")  # optional: type checkers must not need it
         except ImportError as error:
             raise ConfigError("executor", "ray", "process, or install Ray: pip install 'auvdock[ray]'") from error
-        self._ray: Any = ray
+        self._ray = ray
         self._limit_s = limit_s
         environment = {"env_vars": dict(THREAD_LIMITS)}
         try:

@@ -13,6 +13,7 @@ __all__ = ["COMMANDS", "main"]
 COMMANDS = {
     ("dock", "conical"): ("auvdock.cli.dock:run_conical", "dock into the conical station, one episode"),
     ("sweep",): ("auvdock.cli.sweep:run", "run many episodes over currents, turbidity and more"),
+    ("report",): ("auvdock.cli.report:run", "turn a campaign into one HTML page and tables for a paper"),
     ("view",): ("auvdock.cli.view:run", "open a recording in the Rerun viewer"),
     ("reproduce", "guidance-space"): (
         "auvdock.cli.reproduce:run_guidance_space",
