@@ -82,5 +82,6 @@ class ChaseCamera:
         mujoco.mjr_resizeOffscreen(width, height, self._context)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         self._scene = mujoco.MjvScene(model, 2 * model.ngeom + 100)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0  # software rendering takes ten times as long with them
         self._process = os.getpid()

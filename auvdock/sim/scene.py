@@ -69,11 +69,14 @@ def scene_xml(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) -> s
     <quality offsamples="0" shadowsize="0"/>
     <map znear="0.005" zfar="25"/>
     <headlight ambient="0.35 0.35 0.35" diffuse="0.4 0.4 0.4" specular="0 0 0"/>
+    <rgba fog="0.03 0.16 0.24 1"/>
   </visual>
   <default>
     <geom solref="{_CONTACT_TIME_S} 1" solimp="0.95 0.99 0.001"/>
   </default>
   <asset>
+    <texture name="water" type="skybox" builtin="gradient" rgb1="0.06 0.30 0.42" rgb2="0.01 0.07 0.12" width="64"
+      height="384"/>
     <material name="station" rgba="0.55 0.57 0.55 1" specular="0.1"/>
     <material name="floor" rgba="0.45 0.42 0.34 1" specular="0"/>
     <material name="hull" rgba="0.95 0.78 0.12 1" specular="0.2"/>
