@@ -92,17 +92,23 @@ def blue_detections(
     rng: np.random.Generator, centres_px: Array, sigma_px: float = 0.5, score: float = 0.9
 ) -> tuple[Detections, IntArray]:
     """Noisy detections in shuffled order, and for each the row of `centres_px` it came from."""
-    order = rng.permutation(len(centres_px))
-    centres = centres_px[order] + rng.normal(0.0, sigma_px, (len(order), 2))
-    scores = np.clip(score + rng.normal(0.0, 0.05, len(order)), 0.0, 1.0)
-    return Detections.from_points(centres, scores, np.full(len(order), BLUE, dtype=np.int64)), order
+    n = len(centres_px)
+    order = rng.permutation(n)
+    noise = rng.standard_normal((n, 3))
+    centres = centres_px[order] + sigma_px * noise[:, :2]
+    scores = np.minimum(np.abs(score + 0.05 * noise[:, 2]), 1.0)
+    return Detections.from_points(centres, scores, np.full(n, BLUE, dtype=np.int64)), order
 
 
 def labels_by_detection(percept: Percept, detections: Detections) -> dict[int, int]:
     """{row of the detection: beacon id} of the tracks that were seen in this frame."""
-    named: dict[int, int] = {}
-    for track in percept.tracks:
-        if track.beacon_id is not None and track.missed == 0:
-            gap = np.linalg.norm(detections.centre_px - track.centre_px, axis=1)
-            named[int(gap.argmin())] = track.beacon_id
-    return named
+    seen = [track for track in percept.tracks if track.beacon_id is not None and track.missed == 0]
+    if not seen:
+        return {}
+    centres = np.array([track.centre_px for track in seen])
+    gap = ((centres[:, None] - detections.centre_px[None]) ** 2).sum(axis=2)
+    return {
+        row: track.beacon_id
+        for row, track in zip(gap.argmin(axis=1).tolist(), seen, strict=True)
+        if track.beacon_id is not None
+    }

@@ -28,7 +28,7 @@ from perception_scenes import (
 )
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.core.contracts import Percept
+from auvdock.core.contracts import Detections, Percept
 from auvdock.core.errors import ConfigError
 from auvdock.perception.authentication import AuthenticationCfg, symmetric_pairs
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
@@ -63,20 +63,29 @@ class Scene:
         self.identity: IntArray = np.concatenate([np.arange(len(self.points)), np.full(spurious, SPURIOUS)])
         self.frame = 0
 
-    def show(self, perception: BeaconPerception, hidden: frozenset[int] = frozenset()) -> tuple[bool, bool, Percept]:
-        """Process the next frame: (all identities right, any identity wrong, percept)."""
-        time_s = self.frame / 30.0
-        self.frame += 1
-        T_station_camera, euler = self.motion.at(time_s)
-        centres = np.vstack([pixels_of(T_station_camera, self.points), self.stray + self.drift * time_s])
+    def show(
+        self, perception: BeaconPerception, frames: int, hidden: frozenset[int] = frozenset()
+    ) -> tuple[bool, bool]:
+        """Process frames; of the last: (all right behind a measured pose, any wrong behind a pose)."""
         visible = np.array([index for index, name in enumerate(self.identity.tolist()) if name not in hidden])
-        detections, order = blue_detections(self.rng, centres[visible])
-        percept = perception.update(detections, proprioception(self.rng, euler, time_s, self.bias))
+        for _ in range(frames - 1):
+            self._step(perception, visible)
+        percept, detections, order = self._step(perception, visible)
         truth = self.identity[visible][order].tolist()
         named = labels_by_detection(percept, detections)
         wanted = {row: name for row, name in enumerate(truth) if name < len(ARRAY)}
         wrong = any(wanted.get(row) != name for row, name in named.items())
-        return named == wanted, wrong, percept
+        pose = percept.pose
+        return named == wanted and pose is not None and pose.measured, wrong and pose is not None
+
+    def _step(self, perception: BeaconPerception, visible: IntArray) -> tuple[Percept, Detections, IntArray]:
+        time_s = self.frame / 30.0
+        self.frame += 1
+        T_station_camera, euler = self.motion.at(time_s)
+        centres = np.vstack([pixels_of(T_station_camera, self.points), self.stray + self.drift * time_s])
+        detections, order = blue_detections(self.rng, centres[visible])
+        percept = perception.update(detections, proprioception(self.rng, euler, time_s, self.bias))
+        return percept, detections, order
 
 
 @pytest.mark.parametrize("chunk", range(CHUNKS))
@@ -92,17 +101,13 @@ def test_all_lights_then_three_of_six_missing(chunk: int):
     for index in range(CHUNK):
         scene = Scene(rng, with_far=index % 2 == 1, spurious=0)
         perception.reset()
-        good, wrong, percept = False, False, None
-        for _ in range(4):
-            good, wrong, percept = scene.show(perception)
-        assert percept is not None
-        right += good and percept.pose is not None and percept.pose.measured
-        surviving += wrong and percept.pose is not None
+        good, wrong = scene.show(perception, 4)
+        right += good
+        surviving += wrong
         hidden = frozenset(rng.permutation(6)[:3].tolist())
-        for _ in range(3):
-            good, wrong, percept = scene.show(perception, hidden)
-        right_missing += good and percept.pose is not None and percept.pose.measured
-        surviving += wrong and percept.pose is not None
+        good, wrong = scene.show(perception, 3, hidden)
+        right_missing += good
+        surviving += wrong
     assert right >= 0.999 * CHUNK
     assert right_missing >= 0.99 * CHUNK
     assert surviving < 0.001 * CHUNK
@@ -120,12 +125,9 @@ def test_two_spurious_lights(chunk: int):
     for index in range(CHUNK):
         scene = Scene(rng, with_far=index % 2 == 1, spurious=2)
         perception.reset()
-        good, wrong, percept = False, False, None
-        for _ in range(4):
-            good, wrong, percept = scene.show(perception)
-        assert percept is not None
-        right += good and percept.pose is not None and percept.pose.measured
-        surviving += wrong and percept.pose is not None
+        good, wrong = scene.show(perception, 4)
+        right += good
+        surviving += wrong
     assert right >= 0.999 * CHUNK
     assert surviving < 0.001 * CHUNK
 
@@ -138,14 +140,9 @@ def test_three_lights_last_beyond_the_prediction():
     for _ in range(100):
         scene = Scene(rng, with_far=True, spurious=0)
         perception.reset()
-        for _ in range(4):
-            scene.show(perception)
-        hidden = frozenset(rng.permutation(6)[:3].tolist())
-        good, percept = False, None
-        for _ in range(14):
-            good, _, percept = scene.show(perception, hidden)
-        assert percept is not None
-        right += good and percept.pose is not None and percept.pose.measured
+        scene.show(perception, 4)
+        good, _ = scene.show(perception, 14, frozenset(rng.permutation(6)[:3].tolist()))
+        right += good
     assert right >= 99
 
 
@@ -158,9 +155,7 @@ def test_first_sight_with_a_beacon_missing():
         scene = Scene(rng, with_far=True, spurious=1)
         perception.reset()
         hidden = frozenset([int(rng.integers(6))])
-        good = False
-        for _ in range(4):
-            good, _, _ = scene.show(perception, hidden)
+        good, _ = scene.show(perception, 4, hidden)
         right += good
     assert right >= 297
 
@@ -174,9 +169,7 @@ def test_wrong_compass_is_forgiven():
         scene = Scene(rng, with_far=True, spurious=1)
         scene.bias = np.radians([0.5, 0.5, 8.0 * rng.choice([-1.0, 1.0])])
         perception.reset()
-        good = False
-        for _ in range(4):
-            good, _, _ = scene.show(perception)
+        good, _ = scene.show(perception, 4)
         right += good
     assert right >= 297
 
