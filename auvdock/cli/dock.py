@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import sys
@@ -12,10 +13,13 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from auvdock.campaign.replay import StoredEpisode, stored_episode
+from auvdock.campaign.row import differences, row_of
 from auvdock.cli.display import ProgressDisplay, print_result
 from auvdock.cli.parsing import base_config, parse
 from auvdock.core.errors import ConfigError, GraphicsError
 from auvdock.episode.config import EpisodeCfg
+from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
 from auvdock.episode.trace import EpisodeObserver
 from auvdock.optics.gl import probe_gl
@@ -49,6 +53,8 @@ class DockConical:
     """Difficulty 0 to 4; the flags change single things of it."""
     config: Path | None = None
     """TOML file with further settings, on top of the level."""
+    from_: Annotated[str | None, tyro.conf.arg(name="from", metavar="DIR#EPISODE")] = None
+    """Fly an episode of a campaign again, bit for bit; other flags then change single things of it."""
     record: Path | None = None
     """Write a Rerun recording here."""
     json: bool = False
@@ -85,11 +91,13 @@ class DockConical:
 
 def run_conical(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
-    default = DockConical(episode=base_config(argv)) if not {"-h", "--help"} & set(argv) else DockConical()
-    args = parse(DockConical, argv, prog, default)
+    stored = _stored(argv)
+    args = parse(DockConical, argv, prog, _defaults(argv, stored))
     if args.seed < 0:
         raise ConfigError("seed", args.seed, "a whole number of 0 or more")
     runner = EpisodeRunner(args.resolve())
+    if stored is not None and (runner.cfg, args.seed) != (stored.cfg, stored.spec.seed):
+        stored = None  # flags made it another episode
     observers: list[EpisodeObserver] = []
     if args.record is not None:
         from auvdock.recording.rerun_recorder import RerunRecorder
@@ -98,11 +106,42 @@ def run_conical(argv: Sequence[str], prog: str) -> int:
     if not args.json:
         observers.append(ProgressDisplay(runner.cfg.world.limits.max_time_s))
     result = runner.run(args.seed, observers)
+    if stored is not None:
+        _tell_whether_equal(stored, result)
     if args.json:
         print(json.dumps(result.to_json(), allow_nan=False))
     else:
         print_result(result, args.record)
     return 0 if result.success else 1
+
+
+def _stored(argv: Sequence[str]) -> StoredEpisode | None:
+    """The campaign's episode that `--from` names."""
+    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    for flag in ("--from", "--level", "--config"):
+        finder.add_argument(flag, default=None)
+    found, _ = finder.parse_known_args(list(argv))
+    reference = getattr(found, "from")
+    if reference is None:
+        return None
+    for flag in ("level", "config"):
+        if getattr(found, flag) is not None:
+            raise ConfigError(flag, getattr(found, flag), "no such flag beside --from, which brings its own settings")
+    return stored_episode(reference)
+
+
+def _defaults(argv: Sequence[str], stored: StoredEpisode | None) -> DockConical:
+    if stored is not None:
+        return DockConical(seed=stored.spec.seed, episode=stored.cfg)
+    return DockConical() if {"-h", "--help"} & set(argv) else DockConical(episode=base_config(argv))
+
+
+def _tell_whether_equal(stored: StoredEpisode, result: EpisodeResult) -> None:
+    if stored.row is None:
+        return
+    changed = differences(stored.row, row_of(stored.spec, result))
+    found = f"differs from the campaign's in {', '.join(changed)}" if changed else "equals the campaign's, bit for bit"
+    print(f"auvdock: episode {stored.spec.episode} {found}", file=sys.stderr)
 
 
 def _working_fidelity() -> str:
