@@ -33,6 +33,10 @@ class AutopilotCfg:
     """Greatest vertical speed that the depth loop asks for."""
     max_heading_error_rad: float = 0.6
     """Heading and pitch errors beyond this count as this much: large turns run at a bounded rate."""
+    integral_zone_rad: float = 0.15
+    """Heading and pitch errors beyond this are not integrated (integral separation): a turn leaves no overshoot."""
+    max_speed_error_m_s: float = 0.4
+    """The shaped speed references stay this close to the measured speed: they do not run away from a saturated hull."""
     force_share: float = 0.85
     """Part of an axis' thrust that its force loop may use; the rest of shared thrusters is left to the moments."""
     moment_share: float = 0.95
@@ -47,6 +51,8 @@ class AutopilotCfg:
             "sway_acceleration_m_s2",
             "max_heave_m_s",
             "max_heading_error_rad",
+            "integral_zone_rad",
+            "max_speed_error_m_s",
             "force_share",
             "moment_share",
             "current_time_constant_s",
@@ -159,10 +165,12 @@ class Autopilot:
         heave = setpoint.heave_m_s
         if setpoint.depth_m is not None:
             heave = _clip(self._depth_gain * (senses.depth_m - setpoint.depth_m), cfg.max_heave_m_s)
+        before = state.references_m_s
+        now = rotate(senses.level, measured)
         references = (
-            _slew(state.references_m_s[0], setpoint.surge_m_s, cfg.surge_acceleration_m_s2 * dt_s),
-            _slew(state.references_m_s[1], setpoint.sway_m_s, cfg.sway_acceleration_m_s2 * dt_s),
-            _slew(state.references_m_s[2], heave, cfg.sway_acceleration_m_s2 * dt_s),
+            self._shape(before[0], setpoint.surge_m_s, now[0], cfg.surge_acceleration_m_s2),
+            self._shape(before[1], setpoint.sway_m_s, now[1], cfg.sway_acceleration_m_s2),
+            self._shape(before[2], heave, now[2], cfg.sway_acceleration_m_s2),
         )
         # Level heading frame to body: the same rotation without its yaw.
         level = senses.level
@@ -172,13 +180,13 @@ class Autopilot:
             drift = rotate_back(world, current)
             through_water = (wanted[0] - drift[0], wanted[1] - drift[1], wanted[2] - drift[2])
         feed = self._balance(through_water)
-        before = state.references_m_s
+        surge_bound, sway_bound = cfg.surge_acceleration_m_s2, cfg.sway_acceleration_m_s2
         push = rotate_back(
             level,
             (
-                self._mass[0] * (references[0] - before[0]) / dt_s,
-                self._mass[1] * (references[1] - before[1]) / dt_s,
-                self._mass[2] * (references[2] - before[2]) / dt_s,
+                self._mass[0] * _clip((references[0] - before[0]) / dt_s, surge_bound),
+                self._mass[1] * _clip((references[1] - before[1]) / dt_s, sway_bound),
+                self._mass[2] * _clip((references[2] - before[2]) / dt_s, sway_bound),
             ),
         )
         lift = rotate_back(level, (0.0, 0.0, self._net_weight_n))
@@ -215,7 +223,8 @@ class Autopilot:
                 dt_s,
             )
             outputs.append(output)
-            integrals.append(integral)
+            turning = axis >= 3 and abs(errors[axis]) > cfg.integral_zone_rad
+            integrals.append(state.integrals[axis] if turning else integral)
         wrench = np.array([outputs[0], outputs[1], outputs[2], 0.0, outputs[3], outputs[4]])
         kept = (integrals[0], integrals[1], integrals[2], integrals[3], integrals[4])
         return wrench, AutopilotState(kept, references, current)
@@ -232,6 +241,11 @@ class Autopilot:
         ]
         kept = (corrected[0], corrected[1], corrected[2], corrected[3], corrected[4])
         return AutopilotState(kept, state.references_m_s, state.current_m_s)
+
+    def _shape(self, reference: float, target: float, measured: float, acceleration_m_s2: float) -> float:
+        """Next speed reference: towards the target at a bounded rate, not far from the measured speed."""
+        moved = reference + _clip(target - reference, acceleration_m_s2 * self._dt_s)
+        return measured + _clip(moved - measured, self._cfg.max_speed_error_m_s)
 
     def _current(self, smoothed: Vector | None, senses: Senses, world: Rows) -> Vector:
         """Current in world axes: ground minus water velocity, smoothed."""
@@ -269,7 +283,3 @@ class Autopilot:
 
 def _clip(value: float, bound: float) -> float:
     return bound if value > bound else -bound if value < -bound else value
-
-
-def _slew(value: float, target: float, step: float) -> float:
-    return value + _clip(target - value, step)

@@ -1,0 +1,129 @@
+"""Guidance laws on kinematic models."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from auvdock.controllers.allocation import ThrustAllocator
+from auvdock.controllers.guidance import (
+    GuidanceCfg,
+    approach_speed,
+    corridor_m,
+    crab_angle,
+    ilos,
+    sway_reach_m_s,
+)
+from auvdock.controllers.linear_model import hydrodynamic_wrench
+from auvdock.controllers.steering import SearchCfg, search, search_pattern
+from auvdock.core.errors import ConfigError
+from auvdock.core.vehicle import load_vehicle
+
+CFG = GuidanceCfg()
+VEHICLE = load_vehicle("remus_hybrid")
+
+
+def cross_track_after(sigma, current_m_s, start_m, time_s=400.0, dt_s=0.1):
+    """ẏ = U sin χ + V_c: a craft that points where guidance says and is carried sideways by a current."""
+    error, integral = start_m, 0.0
+    for _ in range(int(time_s / dt_s)):
+        angle, integral = ilos(error, integral, 2.0, sigma, dt_s)
+        error += (0.5 * math.sin(angle) + current_m_s) * dt_s
+    return error
+
+
+@pytest.mark.parametrize("current_m_s", [-0.2, -0.1, 0.1, 0.3])
+@pytest.mark.parametrize("start_m", [-3.0, 0.0, 3.0])
+def test_integral_action_removes_the_error_of_a_cross_current(current_m_s, start_m):
+    assert abs(cross_track_after(0.1, current_m_s, start_m)) < 0.005
+
+
+def test_without_integral_action_the_error_of_theory_remains():
+    """Steady state of plain LOS: U sin(atan(e/Δ)) = V_c, so e = Δ tan(asin(V_c/U))."""
+    expected = 2.0 * math.tan(math.asin(0.1 / 0.5))
+    assert cross_track_after(0.0, 0.1, 3.0) == pytest.approx(expected, abs=0.005)
+    assert expected > 0.4
+
+
+@given(error=st.floats(-50, 50), integral=st.floats(-50, 50), sigma=st.floats(0, 1))
+def test_course_is_bounded_and_odd(error, integral, sigma):
+    angle, after = ilos(error, integral, 1.5, sigma, 0.1)
+    mirrored, mirrored_after = ilos(-error, -integral, 1.5, sigma, 0.1)
+    assert abs(angle) < math.pi / 2
+    assert abs(after - integral) <= 0.1 * 1.0 / 2.0 / 1.5 * 1.5 * 50
+    assert (mirrored, mirrored_after) == pytest.approx((-angle, -after))
+
+
+def test_far_from_the_path_the_integral_hardly_grows():
+    _, near = ilos(0.5, 0.0, 1.5, 0.1, 1.0)
+    _, far = ilos(50.0, 0.0, 1.5, 0.1, 1.0)
+    assert far < 0.2 * near
+
+
+def test_speed_is_full_on_the_axis_and_falls_to_zero_off_it():
+    for distance in (1.0, 3.0, 6.0, 12.0):
+        width = corridor_m(distance, CFG)
+        assert approach_speed(distance, 0.0, CFG) >= CFG.mid_speed_m_s
+        assert approach_speed(distance, 2.0 * width, CFG) == 0.0
+        assert approach_speed(distance, 1.5 * width, CFG) < approach_speed(distance, width, CFG)
+    assert approach_speed(30.0, 0.0, CFG) == CFG.far_speed_m_s
+
+
+@given(forward=st.floats(0.05, 1.5), port=st.floats(-1.0, 1.0), reach=st.floats(0.05, 0.6))
+def test_crab_brings_sway_within_reach(forward, port, reach):
+    """Outside reference: rotate the wanted velocity into the crabbed hull and look at its sway."""
+    angle = crab_angle(forward, port, reach, math.pi)
+    sway = port * math.cos(angle) - forward * math.sin(angle)
+    assert abs(sway) <= max(reach, 0.0) + 1e-9
+    if abs(port) <= reach:
+        assert angle == 0.0
+    assert crab_angle(forward, -port, reach, math.pi) == pytest.approx(-angle)
+
+
+def test_sway_reach_loads_the_actuators_to_the_given_share():
+    allocator = ThrustAllocator(VEHICLE)
+    lateral = [VEHICLE.actuator_names.index(name) for name in ("fore_lateral", "aft_lateral")]
+    for surge in (0.0, 0.5, 1.0):
+        reach = sway_reach_m_s(VEHICLE, allocator, surge, 1.0)
+        water = hydrodynamic_wrench(VEHICLE, np.array([surge, reach, 0.0, 0.0, 0.0, 0.0]))
+        command = allocator.allocate(np.array([0.0, -water[1], 0.0, 0.0, 0.0, -water[5]]), surge)
+        assert np.abs(command[lateral]).max() == pytest.approx(1.0, abs=1e-3)
+        assert sway_reach_m_s(VEHICLE, allocator, surge, 0.5) < reach
+
+
+def test_the_vehicle_holds_the_benchmarks_cross_current_without_crab():
+    assert sway_reach_m_s(VEHICLE, ThrustAllocator(VEHICLE), CFG.mid_speed_m_s, CFG.sway_share) > 0.3
+
+
+def test_search_widens_returns_and_mirrors():
+    cfg = SearchCfg()
+    pattern = search_pattern(cfg)
+    times = np.arange(0.0, pattern[0][-1], 0.05)
+    port = np.array([search(t, 0.3, 8.0, 1.0, True, pattern, cfg).setpoint.heading_rad for t in times]) - 0.3
+    starboard = np.array([search(t, 0.3, 8.0, -1.0, True, pattern, cfg).setpoint.heading_rad for t in times]) - 0.3
+    np.testing.assert_allclose(port, -starboard)
+    assert port.max() == pytest.approx(cfg.amplitudes_rad[-1], abs=0.02)
+    assert port.min() == pytest.approx(-cfg.amplitudes_rad[-1], abs=0.02)
+    assert np.abs(np.diff(port)).max() <= cfg.turn_rate_rad_s * 0.05 + 1e-9
+    assert all(search(t, 0.0, 8.0, 1.0, True, pattern, cfg).setpoint.surge_m_s == 0.0 for t in times)
+    after = search(pattern[0][-1] + 1.0, 0.3, 8.0, 1.0, True, pattern, cfg).setpoint
+    assert after.surge_m_s > 0.0
+    assert after.heading_rad == 0.3
+
+
+def test_search_stays_in_place_when_the_place_is_known():
+    cfg = SearchCfg()
+    pattern = search_pattern(cfg)
+    for t in np.arange(0.0, 3.0 * pattern[0][-1], 0.5):
+        assert search(t, 0.0, 8.0, 1.0, False, pattern, cfg).setpoint.surge_m_s == 0.0
+
+
+def test_settings_without_meaning_are_refused():
+    with pytest.raises(ConfigError, match="lookahead_mid_m"):
+        GuidanceCfg(lookahead_mid_m=0.0)
+    with pytest.raises(ConfigError, match="amplitudes_rad"):
+        SearchCfg(amplitudes_rad=())
