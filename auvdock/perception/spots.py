@@ -63,11 +63,12 @@ def light_class(image: Image, left: int, top: int, right: int, bottom: int) -> i
     height, width = image.shape[:2]
     pad = 3
     patch = image[max(top - pad, 0) : min(bottom + pad, height), max(left - pad, 0) : min(right + pad, width)]
-    flat = patch.reshape(-1, 3)
-    rim = np.concatenate([patch[0], patch[-1], patch[:, 0], patch[:, -1]])
-    usable = flat[flat.max(axis=1) < _SATURATED]
-    excess = (usable if len(usable) else flat).mean(axis=0) - np.percentile(rim, 20, axis=0)
-    return RED if excess[0] > excess[2] else BLUE
+    usable = cv2.inRange(patch, (0, 0, 0), (_SATURATED - 1,) * 3)
+    red, _, blue, _ = cv2.mean(patch, usable) if cv2.countNonZero(usable) else cv2.mean(patch)
+    # A low quantile: another light may stand on part of the rim.
+    rim = np.sort(np.concatenate([patch[0], patch[-1], patch[:, 0], patch[:, -1]]), axis=0)
+    low_red, _, low_blue = rim[len(rim) // 5].tolist()
+    return RED if red - low_red > blue - low_blue else BLUE
 
 
 def crop_of(region: RegionOfInterest, height: int, width: int) -> tuple[int, int, int, int]:
