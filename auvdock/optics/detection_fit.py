@@ -64,8 +64,9 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
         observations: a few hundred frames that cover the ranges and waters of interest.
     """
     merge_px, merge_radii = _fit_merging(observations)
-    merging = DetectionModelCfg(name, source, 1.0, 1.0, 1.0, merge_px, merge_radii, 0.0, 0.0, 1.0, 0.0, 0.0)
+    merging = DetectionModelCfg(name, source, 1.0, 0.0, 1.0, 1.0, merge_px, merge_radii, 0.0, 0.0, 1.0, 0.0, 0.0)
     contrast: list[Array] = []
+    around: list[Array] = []
     hits: list[BoolArray] = []
     errors: list[Array] = []
     blur: list[Array] = []
@@ -78,6 +79,7 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
         present = lights.contrast_dn > 0.5
         hit = match >= 0
         contrast.append(lights.contrast_dn[present])
+        around.append(lights.surround_dn[present])
         hits.append(hit[present])
         good = hit & present
         partner = match[good]
@@ -88,13 +90,14 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
         gains.append(10.0 * score / (1.0 - score) / snr)
         wrong.append((item.found.class_id[partner] == 1) != lights.red[good])
         alarms += _unexplained(item)
-    c50, slope, ceiling = _fit_curve(np.concatenate(contrast), np.concatenate(hits))
+    c50, factor, slope, ceiling = _fit_curve(np.concatenate(contrast), np.concatenate(around), np.concatenate(hits))
     floor, noise = _fit_spread(np.concatenate(errors), np.concatenate(blur))
     gain = np.concatenate(gains)
     return DetectionModelCfg(
         name=name,
         source=source,
         contrast_50_dn=c50,
+        surround_factor=factor,
         slope=slope,
         ceiling=ceiling,
         merge_px=merge_px,
@@ -155,29 +158,33 @@ def _fit_merging(observations: list[Observation]) -> tuple[float, float]:
         return 2.0, 1.0
     d, r, truth = np.array(gap), np.array(radii), np.array(apart)
     best = (len(truth), 2.0, 1.0)
-    for merge_px in np.arange(0.0, 12.1, 0.5):
-        for merge_radii in np.arange(0.0, 2.01, 0.1):
+    # From what optics alone cannot part: cores within 2 px, and saturated discs that touch.
+    for merge_px in np.arange(2.0, 12.1, 0.5):
+        for merge_radii in np.arange(1.0, 2.01, 0.1):
             wrong = int(np.count_nonzero((d > merge_px + merge_radii * r) != truth))
             if wrong < best[0]:
                 best = (wrong, float(merge_px), float(round(merge_radii, 3)))
     return best[1], best[2]
 
 
-def _fit_curve(contrast: Array, hit: BoolArray) -> tuple[float, float, float]:
+def _fit_curve(contrast: Array, around: Array, hit: BoolArray) -> tuple[float, float, float, float]:
     bright = contrast > _BRIGHT_DN
     ceiling = float(np.mean(hit[bright])) if np.count_nonzero(bright) > 20 else 1.0
     ceiling = min(max(ceiling, 0.05), 1.0)
     log_c = np.log(np.maximum(contrast, 1e-3))
 
     def cost(x: Array) -> float:
-        p = ceiling / (1.0 + np.exp(np.clip(-math.exp(x[1]) * (log_c - x[0]), -60.0, 60.0)))
+        log_50 = np.log(math.exp(x[0]) + math.exp(x[1]) * around)
+        p = ceiling / (1.0 + np.exp(np.clip(-math.exp(x[2]) * (log_c - log_50), -60.0, 60.0)))
         p = np.clip(p, 1e-6, 1.0 - 1e-6)
         return -float(np.sum(np.where(hit, np.log(p), np.log(1.0 - p))))
 
-    starts = [(math.log(c), math.log(s)) for c in (5.0, 15.0, 40.0) for s in (3.0, 10.0)]
-    fits = [minimize(cost, np.array(start), method="Nelder-Mead") for start in starts]
-    best = fits[int(np.argmin([float(fit.fun) for fit in fits]))]
-    return math.exp(float(best.x[0])), min(math.exp(float(best.x[1])), 30.0), ceiling
+    starts = [
+        (math.log(c), math.log(f), math.log(s)) for c in (5.0, 20.0, 60.0) for f in (0.1, 1.0) for s in (3.0, 8.0)
+    ]
+    fits = [minimize(cost, np.array(start), method="Nelder-Mead", options={"maxiter": 600}) for start in starts]
+    best = fits[int(np.argmin([float(fit.fun) for fit in fits]))].x
+    return math.exp(float(best[0])), math.exp(float(best[1])), min(math.exp(float(best[2])), 30.0), ceiling
 
 
 def _fit_spread(errors: Array, blur: Array) -> tuple[float, float]:
@@ -191,4 +198,5 @@ def _fit_spread(errors: Array, blur: Array) -> tuple[float, float]:
         return float(np.sum(np.log(variance) + 2.5 * np.log1p(square / (3.0 * variance))))
 
     best = minimize(cost, np.array([math.log(0.05), math.log(0.1)]), method="Nelder-Mead")
-    return math.exp(float(best.x[0])), math.exp(float(best.x[1]))
+    # Bright lights can fit with no floor at all; eight-bit codes still leave some thousandths of a pixel.
+    return max(math.exp(float(best.x[0])), 0.005), math.exp(float(best.x[1]))

@@ -25,8 +25,8 @@ _ONES = np.ones(2)
 class DetectionModelCfg:
     """Behaviour of one detector.
 
-    A light is found with probability 1 / (1 + (contrast_50_dn / C)^slope), C its contrast in codes above its
-    surroundings.
+    A light is found with probability ceiling / (1 + (C_50 / C)^slope), C its contrast in codes above its surroundings,
+    C_50 = contrast_50_dn + surround_factor × the surroundings' code: a bright neighbourhood hides lights.
     """
 
     name: str
@@ -34,7 +34,9 @@ class DetectionModelCfg:
     source: str
     """What it was fitted on."""
     contrast_50_dn: float
-    """Contrast at which half of the lights are found."""
+    """Contrast at which half of the lights are found in dark surroundings."""
+    surround_factor: float
+    """Rise of that contrast per code of the surroundings."""
     slope: float
     """Steepness in ln C."""
     ceiling: float
@@ -60,7 +62,7 @@ class DetectionModelCfg:
         for name in ("contrast_50_dn", "slope", "score_gain"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ConfigError(f"detection.{name}", getattr(self, name), "a number above 0")
-        for name in ("merge_px", "merge_radii", "centre_floor_px", "centre_at_100", "false_alarms"):
+        for name in ("surround_factor", "merge_px", "merge_radii", "centre_floor_px", "centre_at_100", "false_alarms"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ConfigError(f"detection.{name}", getattr(self, name), "0 or more")
         for name in ("ceiling", "wrong_colour"):
@@ -75,6 +77,7 @@ class Candidates:
     Attributes:
         pixels: (m, 2) positions.
         contrast_dn: (m,) code at the centre above the code of its surroundings, in the light's brightest channel.
+        surround_dn: (m,) code of those surroundings.
         noise_dn: (m,) standard deviation of the code there.
         radius_px: (m,) radius of the saturated disc, 0 without one.
         width_px: (m,) width of the spot.
@@ -84,6 +87,7 @@ class Candidates:
 
     pixels: Array
     contrast_dn: Array
+    surround_dn: Array
     noise_dn: Array
     radius_px: Array
     width_px: Array
@@ -116,10 +120,12 @@ def draw_detections(
     alarms = rng.poisson(model.false_alarms) if model.false_alarms > 0.0 else 0
     merged = merge_close(seen, model)
     contrast = merged.contrast_dn
-    found = np.maximum(contrast, 1e-9) ** -model.slope
-    found *= model.contrast_50_dn**model.slope
-    found += 1.0
-    hit = (chance[0] * found < model.ceiling) & (contrast > 0.0)
+    odds = merged.surround_dn * model.surround_factor
+    odds += model.contrast_50_dn
+    odds /= np.maximum(contrast, 1e-3)
+    odds **= model.slope
+    odds += 1.0
+    hit = (chance[0] * odds < model.ceiling) & (contrast > 1e-3)
     index = hit.nonzero()[0]
     index = index[(-contrast[index]).argsort(kind="stable")]
     strength = contrast[index]
@@ -187,7 +193,7 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
         for k in members:
             if k != first:
                 contrast[k] = 0.0
-    return Candidates(pixels, contrast, seen.noise_dn, radius, seen.width_px, flux, seen.red)
+    return Candidates(pixels, contrast, seen.surround_dn, seen.noise_dn, radius, seen.width_px, flux, seen.red)
 
 
 def _root(lead: list[int], i: int) -> int:

@@ -123,6 +123,7 @@ def candidates_in_view(
     seen = Candidates(
         pixels,
         contrast,
+        codes[1],
         scale.noise_dn(around + own),
         np.sqrt(area.max(axis=1) * (1.0 / math.pi)),
         spots.sigma_px,
@@ -148,6 +149,7 @@ def _with_flakes(lit: LitScene, view: View, seen: Candidates, scale: SensorScale
     return Candidates(
         np.concatenate([seen.pixels, flakes.pixels[shown]]),
         np.concatenate([seen.contrast_dn, contrast[shown]]),
+        np.concatenate([seen.surround_dn, np.zeros(len(shown))]),
         np.concatenate([seen.noise_dn, scale.noise_dn(peak[shown])]),
         np.concatenate([seen.radius_px, np.zeros(len(shown))]),
         np.concatenate([seen.width_px, sigma[shown]]),

@@ -16,7 +16,7 @@ class ExposureCfg:
 
     automatic: bool = True
     """False holds the exposure at `initial_s` and the gain at 1."""
-    saturated_share: float = 0.0006
+    saturated_share: float = 0.00015
     """Share of samples (pixels × channels) that is to be saturated: the lights' cores, and little of their halos."""
     dead_band: float = 0.3
     """Relative distance from the wanted share within which the exposure is left alone."""
