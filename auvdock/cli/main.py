@@ -10,7 +10,7 @@ from auvdock.core.errors import AuvdockError
 
 __all__ = ["COMMANDS", "main"]
 
-COMMANDS = {
+COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
     ("dock", "conical"): ("auvdock.cli.dock:run_conical", "dock into the conical station, one episode"),
     ("sweep",): ("auvdock.cli.sweep:run", "run many episodes over currents, turbidity and more"),
     ("report",): ("auvdock.cli.report:run", "turn a campaign into one HTML page and tables for a paper"),

@@ -13,7 +13,7 @@ finite = st.floats(-50.0, 50.0)
 
 
 def test_integral_of_a_constant_error_is_exact():
-    integral = 0.0
+    output = integral = 0.0
     for _ in range(90):
         output, integral = pid_step(PidGains(2.0, 0.5, 1.0), integral, 0.1, 0.0, 0.0, 100.0, 1.0 / 30.0)
     assert integral == pytest.approx(0.5 * 0.1 * 3.0)
@@ -45,7 +45,7 @@ def test_odd_symmetry(error, rate, integral, feed):
 
 def test_saturated_loop_leaves_saturation_at_once():
     """Against a wall for a minute, then the error changes sign: conditional integration has nothing to unwind."""
-    gains, integral = PidGains(1.0, 1.0), 0.0
+    gains, integral, output = PidGains(1.0, 1.0), 0.0, 0.0
     for _ in range(600):
         output, integral = pid_step(gains, integral, 20.0, 0.0, 0.0, 5.0, 0.1)
     assert output == 5.0

@@ -1,6 +1,7 @@
 """The Gymnasium contract: spaces, seeds, pickling, vectorisation, honest info."""
 
 import pickle
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -17,8 +18,7 @@ SMALL = WorldCfg(camera=CameraCfg(width_px=160, height_px=90))
 
 def rollout(env, seed, steps):
     actions = np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, *env.action_space.shape))
-    observation, info = env.reset(seed=seed)
-    trace = [(observation, info)]
+    trace: list[Any] = [env.reset(seed=seed)]
     for action in actions.astype(np.float32):
         observation, reward, terminated, truncated, info = env.step(action)
         trace.append((observation, reward, terminated, truncated, info))
@@ -47,7 +47,7 @@ def test_environment_checker_is_content(observation):
 @pytest.mark.render
 @pytest.mark.filterwarnings("error::UserWarning")
 def test_environment_checker_is_content_with_images():
-    options = {"cfg": SMALL, "observation": "image", "fidelity": "pixels", "render_mode": "rgb_array"}
+    options: dict[str, Any] = {"cfg": SMALL, "observation": "image", "fidelity": "pixels", "render_mode": "rgb_array"}
     env = gymnasium.make("auvdock/ConicalDocking-v0", **options)
     check_env(env.unwrapped)
     env.close()

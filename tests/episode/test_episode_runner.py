@@ -40,6 +40,8 @@ def test_an_episode_docks_and_tells_its_metrics():
     json.dumps(plain, allow_nan=False)
     assert result.invalid_frames <= result.precise_frames
     assert result.distortion_rate == pytest.approx(result.invalid_frames / result.precise_frames)
+    assert result.entry_distance_m is not None
+    assert result.lateral_error_m is not None
     assert 5.0 < result.entry_distance_m < 31.0
     assert result.path_length_m >= result.entry_distance_m
     assert result.energy_j > 0.0
