@@ -21,6 +21,10 @@ from auvdock.perception.spots import background, brightest_channel, crop_of, ins
 __all__ = ["ThresholdCfg", "ThresholdDetector"]
 
 _MAX_DEPTH = 6
+_CUTS = (0.1, 0.2, 0.35, 0.5, 0.75, 0.9)
+"""Levels between floor and peak at which a component is cut again: the low ones free a dim light beside a bright one."""
+_LARGE_PX = 300
+"""A box smaller than this holds no second, dimmer light: the low levels are left out."""
 _SCORE_HALF_SNR = 10.0
 
 
@@ -132,7 +136,7 @@ class ThresholdDetector:
         """Cut a component at higher levels; where it falls apart go on with its parts, else take it as one light."""
         peak = float(patch.max())
         if depth < _MAX_DEPTH and patch.size >= 36:
-            for fraction in (0.5, 0.75, 0.9):
+            for fraction in _CUTS if patch.size >= _LARGE_PX else _CUTS[-3:]:
                 level = floor + fraction * (peak - floor)
                 if peak - level <= prominence:
                     break
