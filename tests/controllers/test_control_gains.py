@@ -54,12 +54,15 @@ def test_all_loops_closed_on_the_coupled_vehicle_are_stable(surge_m_s):
     for index, (axis, row) in enumerate(ROWS.items()):
         outputs[index, row + 3 if axis in ("pitch", "heading") else row] = 1.0
     plant: Any = control.ss(a, b[:, rows], outputs, np.zeros((5, 5)))
-    lag = control.tf([1.0], [VEHICLE.actuators[0].time_constant_s, 1.0])
-    delay = control.tf(*control.pade(1.5 * DT_S, 2))
+    lag: Any = control.tf([1.0], [VEHICLE.actuators[0].time_constant_s, 1.0])
+    delay: Any = control.tf(*control.pade(1.5 * DT_S, 2))
     # A pole far out makes the derivative proper; it costs half a degree at crossover.
-    channels = [control.ss(pid_transfer(axis) * control.tf([1.0], [0.005, 1.0]) * lag * delay) for axis in AXES]
+    channels: list[Any] = [
+        control.ss(pid_transfer(axis) * control.tf([1.0], [0.005, 1.0]) * lag * delay) for axis in AXES
+    ]
     loop: Any = plant * reduce(control.append, channels)
-    closed: Any = control.feedback(loop, control.ss([], [], [], np.eye(5)))
+    identity: Any = control.ss([], [], [], np.eye(5))
+    closed: Any = control.feedback(loop, identity)
     poles = closed.poles()
     # Yaw integrates into nothing but the heading: no pole may stay at the origin once the loop is closed.
     assert max(poles.real) < -0.005
