@@ -22,7 +22,7 @@ __all__ = ["ThresholdCfg", "ThresholdDetector"]
 
 _MAX_DEPTH = 6
 _CUTS = (0.1, 0.2, 0.35, 0.5, 0.75, 0.9)
-"""Levels between floor and peak at which a component is cut again: the low ones free a dim light beside a bright one."""
+"""Levels between floor and peak at which a component is cut again; the low ones free a dim light by a bright one."""
 _LARGE_PX = 300
 """A box smaller than this holds no second, dimmer light: the low levels are left out."""
 _SCORE_HALF_SNR = 10.0
