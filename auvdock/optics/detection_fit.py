@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment, minimize
 
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.core.contracts import Detections, Detector
-from auvdock.optics.detection_model import Candidates, DetectionModelCfg, merge_close
+from auvdock.optics.detection_model import Candidates, DetectionModelCfg, merge_close, veiled_share
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.sensing import candidates_in_view
 
@@ -105,7 +105,7 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
         centre_floor_px=floor,
         centre_at_100=noise,
         score_gain=float(np.median(gain)) if len(gain) else 1.0,
-        false_alarms=alarms / max(len(observations), 1),
+        false_alarms=alarms / max(sum(veiled_share(item.seen) for item in observations), 1.0),
         wrong_colour=float(np.mean(np.concatenate(wrong))) if len(gain) else 0.0,
     )
 

@@ -16,9 +16,10 @@ from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
 
-__all__ = ["Candidates", "DetectionModelCfg", "draw_detections", "load_detection_model", "merge_close"]
+__all__ = ["Candidates", "DetectionModelCfg", "draw_detections", "load_detection_model", "merge_close", "veiled_share"]
 
 _ONES = np.ones(2)
+_HAZE_PX = 20.0
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,8 @@ class DetectionModelCfg:
     score_gain: float
     """Score = s / (s + 10) with s this times contrast over noise."""
     false_alarms: float
-    """Mean number of detections per frame that belong to no light."""
+    """Mean number of detections per frame that belong to no light when all lights are veiled: haze that breaks into
+    spots. It falls with the share of lights that are; see `veiled_share`."""
     wrong_colour: float
     """Share of detections of the wrong class."""
 
@@ -117,7 +119,7 @@ def draw_detections(
     """
     m = len(seen.flux)
     chance, noise = rng.random((2, m)), rng.standard_normal((m, 2))
-    alarms = rng.poisson(model.false_alarms) if model.false_alarms > 0.0 else 0
+    alarms = rng.poisson(model.false_alarms * veiled_share(seen))
     merged = merge_close(seen, model)
     contrast = merged.contrast_dn
     odds = merged.surround_dn * model.surround_factor
@@ -146,12 +148,19 @@ def draw_detections(
     xyxy[:, :2] = centre - half
     xyxy[:, 2:] = centre + half
     if alarms:
-        ghosts = rng.random((alarms, 2)) * np.array(size_px) - 0.5
+        ghosts = seen.pixels[rng.integers(0, m, alarms)] + rng.normal(0.0, _HAZE_PX, (alarms, 2))
+        ghosts = np.clip(ghosts, -0.5, np.array(size_px) - 0.5)
         centre = np.concatenate([centre, ghosts])
         xyxy = np.concatenate([xyxy, np.concatenate([ghosts - 2.0, ghosts + 2.0], axis=1)])
         score = np.concatenate([score, rng.uniform(0.2, 0.5, alarms)])
         class_id = np.concatenate([class_id, rng.integers(0, 2, alarms)])
     return Detections(xyxy, centre, score, class_id)
+
+
+def veiled_share(seen: Candidates) -> float:
+    """Share of lights whose surroundings outshine their contrast by 50 codes or more."""
+    m = len(seen.flux)
+    return np.count_nonzero(seen.surround_dn > seen.contrast_dn + 50.0) / m if m else 0.0
 
 
 def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
