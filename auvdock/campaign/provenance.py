@@ -16,13 +16,15 @@ __all__ = ["git_revision", "manifest_of"]
 
 
 def manifest_of(cfg: CampaignCfg) -> dict[str, Any]:
-    """What a campaign's manifest tells: the campaign, its resolved base configuration, versions, revision, date."""
+    """What a campaign's manifest tells: the campaign, its resolved base configuration, and this session's software."""
     return {
         "campaign": to_plain(cfg),
         "base_config": to_plain(cfg.base(cfg.level)),
-        "versions": software_versions(),
-        "git_revision": git_revision(),
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "session": {
+            "begun": datetime.now(UTC).isoformat(timespec="seconds"),
+            "versions": software_versions(),
+            "git_revision": git_revision(),
+        },
     }
 
 

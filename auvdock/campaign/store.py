@@ -111,11 +111,19 @@ class Store:
             self._lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             self._take_lock()
+            sessions: list[Any] = []
             if (folder / MANIFEST).exists():
                 if not resume:
                     raise CampaignError(f"{folder}: holds a campaign; add --resume to go on, or give another --out")
-                _check_same(read_campaign(folder), cfg)
-            self._write_manifest({"format": FORMAT, **manifest})
+                there = read_manifest(folder)
+                _check_same(campaign_from_plain(there["campaign"]), cfg)
+                if there["base_config"] != manifest["base_config"]:
+                    raise CampaignError(f"{folder}: begun when level {cfg.level} was another; give another --out")
+                sessions = there["sessions"]
+            self.is_mixed = any(_software(session) != _software(manifest["session"]) for session in sessions)
+            """Earlier rows come from other versions."""
+            fixed = {name: value for name, value in manifest.items() if name != "session"}
+            self._write_manifest({"format": FORMAT, **fixed, "sessions": [*sessions, manifest["session"]]})
             for leftover in folder.glob(f"{TEMPORARY}*"):
                 leftover.unlink()
             rows = read_table(folder).column("episode").to_pylist() if resume else []
@@ -257,6 +265,10 @@ def _check_same(there: CampaignCfg, wanted: CampaignCfg) -> None:
     redrawn = wanted.sampling == "latin_hypercube" and any(not axis.is_grid for axis in wanted.axes)
     if redrawn and there.episodes != wanted.episodes:
         raise ConfigError("episodes", wanted.episodes, f"{there.episodes}: a Latin hypercube cannot be extended")
+
+
+def _software(session: dict[str, Any]) -> tuple[object, object]:
+    return session["versions"], session["git_revision"]
 
 
 def _sync(path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -137,6 +138,8 @@ def run(argv: Sequence[str], prog: str) -> int:
     Plan(cfg).config(Plan(cfg)[0])
     executor = _executor(args, cfg)
     store = Store(args.out, cfg, manifest_of(cfg), args.resume)
+    if store.is_mixed:
+        print("auvdock: earlier episodes were run by other versions; rows may not repeat", file=sys.stderr)
     observer = SweepProgress(Console(stderr=True), executor.workers, quiet=args.json)
     summary = run_campaign(cfg, DockingJob(cfg), store, executor, observer)
     if args.json:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from auvdock.campaign.axes import AxisCfg, AxisValue
 from auvdock.campaign.config import CampaignCfg
@@ -48,7 +49,7 @@ class Campaign:
 
     folder: Path
     cfg: CampaignCfg
-    manifest: dict[str, object]
+    manifest: dict[str, Any]
     rows: list[Row]
 
     @property

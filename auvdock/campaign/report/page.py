@@ -195,15 +195,15 @@ def replay_command(folder: Path, episode: int) -> str:
 
 
 def _reproduce(campaign: Campaign) -> str:
-    manifest = campaign.manifest
-    found = manifest.get("versions")
-    versions = ", ".join(f"{name} {number}" for name, number in found.items()) if isinstance(found, dict) else ""
-    revision = manifest.get("git_revision") or "none"
+    sessions = [
+        f"{', '.join(f'{name} {number}' for name, number in session['versions'].items())}; "
+        f"git revision {session['git_revision'] or 'none'}; begun {session['begun']}"
+        for session in campaign.manifest["sessions"]
+    ]
     return (
         f"<h2>To run it again</h2>\n<p><code>manifest.json</code> holds the campaign. Any episode flies again, bit for "
         f"bit, with <code>{escape(replay_command(campaign.folder, 0))}</code>.</p>"
-        f'<p class="muted">{escape(versions)}; git revision {escape(str(revision))}; begun '
-        f"{escape(str(manifest.get('created')))}.</p>"
+        + "".join(f'<p class="muted">{escape(session)}.</p>' for session in sessions)
     )
 
 
