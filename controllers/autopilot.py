@@ -75,6 +75,7 @@ class AutopilotSetpoint(NamedTuple):
         heading_rad: world yaw, positive to port.
         depth_m: depth to hold, positive down, or None.
         through_water: True if the speeds are through the water, False if over ground.
+        turn_rad_s: rate at which the heading set-point itself turns, positive to port.
     """
 
     surge_m_s: float
@@ -84,6 +85,7 @@ class AutopilotSetpoint(NamedTuple):
     heading_rad: float
     depth_m: float | None = None
     through_water: bool = False
+    turn_rad_s: float = 0.0
 
 
 class AutopilotState(NamedTuple):
@@ -202,7 +204,7 @@ class Autopilot:
             pitch_error,
             heading_error,
         )
-        rates = (0.0, 0.0, 0.0, q, r)
+        rates = (0.0, 0.0, 0.0, q, r - setpoint.turn_rad_s)
         feeds = (
             feed[0] + lift[0] + push[0],
             feed[1] + lift[1] + push[1],

@@ -14,7 +14,7 @@
 | mid | abort | held at the gate outside the corridor for `hold_s`, or in mid for `mid_timeout_s` |
 | near | terminal | nose in the mouth |
 | near | abort | poses jump; too uncertain across the axis; far out of the corridor; no progress |
-| terminal | abort | no progress (stuck) or too long |
+| terminal | abort | no progress (stuck), too long, or past the tube's end by the reckoning |
 | abort | mid, far, acquire | backed off, and attempts are left; by what is known then |
 
 A pilot whose attempts are used up stays in abort and says so; docked is final.
@@ -134,6 +134,7 @@ class Facts(NamedTuple):
         in_mode_s: time in this mode.
         held_s: time at the gate without passing.
         stalled_s: time without progress along the axis.
+        missed: the nose should be past the tube's end, so it cannot be in the tube.
         giving_up: no attempt is left.
     """
 
@@ -152,6 +153,7 @@ class Facts(NamedTuple):
     in_mode_s: float
     held_s: float
     stalled_s: float
+    missed: bool
     giving_up: bool
 
 
@@ -174,7 +176,7 @@ def next_mode(mode: str, facts: Facts, cfg: ModeCfg) -> str:
         return TERMINAL if facts.distance_m <= cfg.mouth_m else NEAR
     if mode == TERMINAL:
         stuck = facts.stalled_s > cfg.stall_s or facts.in_mode_s > cfg.terminal_timeout_s
-        return ABORT if stuck else TERMINAL
+        return ABORT if stuck or facts.missed else TERMINAL
     return _after_abort(facts, cfg, has_pose, sees_light)
 
 

@@ -24,7 +24,7 @@ from auvdock.controllers.modes import (
     next_mode,
 )
 from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
-from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, turn
+from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of, turn
 from auvdock.controllers.steering import (
     Place,
     SearchCfg,
@@ -135,7 +135,7 @@ class ConicalPilot:
         self.allocator = ThrustAllocator(vehicle, cfg.allocation)
         self._dt_s = dt_s
         self._filter = RelativeFilter(cfg.filter, camera.T_body_camera, dt_s)
-        self._R_body_camera = np.ascontiguousarray(camera.T_body_camera[:3, :3])
+        self._R_body_camera = rows_of(camera.T_body_camera[:3, :3])
         lever = camera.T_body_camera[:3, 3]
         self._camera_to_nose: Vector = (vehicle.nose_x_m - float(lever[0]), -float(lever[1]), -float(lever[2]))
         layout = station.layout
@@ -145,6 +145,7 @@ class ConicalPilot:
         centre = layout.positions_m[list(entrance)].mean(axis=0) if entrance else np.array([-1.0, 0.0, 0.0])
         self._entrance_m: Vector = (float(centre[0]), float(centre[1]), float(centre[2]))
         self._funnel_length_m = station.funnel.length_m
+        self._end_m = station.funnel.length_m + station.funnel.tube_length_m + 0.3
         self._has_entrance = bool(entrance)
         self._reach_m_s = sway_reach_m_s(vehicle, self.allocator, cfg.guidance.mid_speed_m_s, cfg.guidance.sway_share)
         self._pattern = search_pattern(cfg.search)
@@ -182,8 +183,9 @@ class ConicalPilot:
         relative = self._track(state.relative, percept, senses)
         sight = self._look(state.sight, percept, senses)
         place = self._place(relative, senses) if relative is not None else None
+        jumped = _restarts(relative) > _restarts(state.relative)
         state = self._progress(state, place, senses.time_s)._replace(relative=relative, sight=sight)
-        facts = self._facts(state, place, senses, _restarts(relative) > _restarts(state.relative))
+        facts = self._facts(state, place, senses, jumped)
         mode = next_mode(state.mode, facts, self.cfg.modes)
         if mode != state.mode:
             state = self._enter(state, mode, place, senses)
@@ -219,8 +221,9 @@ class ConicalPilot:
         return Sight(frames, senses.time_s, azimuth, elevation, range_m)
 
     def _world_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
-        x, y, z = (self._R_body_camera @ bearing.ray_camera).tolist()
-        east, north, up = rotate(turn(senses.level, senses.yaw_rad), (x, y, z))
+        x, y, z = bearing.ray_camera.tolist()
+        body = rotate(self._R_body_camera, (x, y, z))
+        east, north, up = rotate(turn(senses.level, senses.yaw_rad), body)
         return math.atan2(north, east), math.atan2(up, math.hypot(east, north))
 
     def _place(self, relative: RelativeState, senses: Senses) -> Place:
@@ -270,6 +273,7 @@ class ConicalPilot:
             in_mode_s=now - (state.since_s or 0.0),
             held_s=now - state.gate_s if state.gate_s is not None else 0.0,
             stalled_s=now - state.best_s,
+            missed=place is not None and place.distance_m < -self._end_m,
             giving_up=state.giving_up,
         )
 

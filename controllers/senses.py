@@ -5,9 +5,21 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
 
-__all__ = ["Rows", "Senses", "Vector", "cross", "read_senses", "rotate", "rotate_back", "rotation_zyx", "turn"]
+__all__ = [
+    "Rows",
+    "Senses",
+    "Vector",
+    "cross",
+    "read_senses",
+    "rotate",
+    "rotate_back",
+    "rotation_zyx",
+    "rows_of",
+    "turn",
+]
 
 Vector = tuple[float, float, float]
 Rows = tuple[float, float, float, float, float, float, float, float, float]
@@ -67,6 +79,12 @@ def _finite(values: list[float]) -> Vector:
         return x, y, z
     clean = [value if math.isfinite(value) else 0.0 for value in values]
     return clean[0], clean[1], clean[2]
+
+
+def rows_of(matrix: Array) -> Rows:
+    """A (3, 3) array as plain rows."""
+    a, b, c, d, e, f, g, h, i = matrix.ravel().tolist()
+    return a, b, c, d, e, f, g, h, i
 
 
 def rotation_zyx(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Rows:

@@ -31,7 +31,7 @@ __all__ = [
 class SearchCfg:
     """The look around while no light is seen."""
 
-    turn_rate_rad_s: float = 0.35
+    turn_rate_rad_s: float = 0.3
     """Rate of the sweep in heading."""
     settle_s: float = 1.5
     """Wait before the first turn."""
@@ -146,14 +146,15 @@ def search(
     ahead_s = cfg.advance_m / cfg.advance_speed_m_s if advance else 0.0
     cycle, moment = divmod(in_mode_s, times[-1] + ahead_s)
     depth = depth_m + cfg.depth_step_m * (0.0, 1.0, 0.0, -1.0)[int(cycle) % 4]
-    offset, speed = 0.0, 0.0
+    offset, rate, speed = 0.0, 0.0, 0.0
     if moment >= times[-1]:
         speed = cfg.advance_speed_m_s
     elif moment > times[0]:
         leg = bisect_right(times, moment) - 1
-        part = (moment - times[leg]) / (times[leg + 1] - times[leg])
-        offset = corners[leg] + part * (corners[leg + 1] - corners[leg])
-    return Steering(AutopilotSetpoint(speed, 0.0, 0.0, 0.0, heading_rad + side * offset, depth))
+        rate = math.copysign(cfg.turn_rate_rad_s, corners[leg + 1] - corners[leg])
+        offset = corners[leg] + rate * (moment - times[leg])
+    heading = heading_rad + side * offset
+    return Steering(AutopilotSetpoint(speed, 0.0, 0.0, 0.0, heading, depth, turn_rad_s=side * rate))
 
 
 def towards_light(

@@ -6,7 +6,7 @@ import math
 from functools import reduce
 from typing import Any
 
-import control
+import control as python_control
 import numpy as np
 import pytest
 
@@ -15,6 +15,8 @@ from auvdock.controllers.linear_model import AXES, acceleration, axis_plants, hy
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import load_vehicle
 
+# python-control ships no usable types.
+control: Any = python_control
 VEHICLE = load_vehicle("remus_hybrid")
 DT_S = 1.0 / 30.0
 CFG = DesignCfg()

@@ -41,6 +41,7 @@ CALM = Facts(
     in_mode_s=1.0,
     held_s=0.0,
     stalled_s=0.0,
+    missed=False,
     giving_up=False,
 )
 BLIND = CALM._replace(
@@ -73,6 +74,7 @@ facts = st.builds(
     in_mode_s=st.floats(0.0, 200.0),
     held_s=st.floats(0.0, 200.0),
     stalled_s=st.floats(0.0, 200.0),
+    missed=st.booleans(),
     giving_up=st.booleans(),
 )
 
@@ -134,6 +136,7 @@ def test_nobody_commits_itself_outside_the_corridor(now):
         (NEAR, {"distance_m": 1.0, "stalled_s": 6.0}, ABORT),
         (TERMINAL, {"distance_m": -1.0}, TERMINAL),
         (TERMINAL, {"distance_m": -1.0, "stalled_s": 6.0}, ABORT),
+        (TERMINAL, {"distance_m": -3.1, "missed": True}, ABORT),
         (ABORT, {"distance_m": 4.0}, ABORT),
         (ABORT, {"distance_m": 7.5}, MID),
         (ABORT, {"distance_m": 7.5, "since_fix_s": 5.0}, FAR),
