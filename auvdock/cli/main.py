@@ -15,6 +15,7 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
     ("sweep",): ("auvdock.cli.sweep:run", "run many episodes over currents, turbidity and more"),
     ("report",): ("auvdock.cli.report:run", "turn a campaign into one HTML page and tables for a paper"),
     ("view",): ("auvdock.cli.view:run", "open a recording in the Rerun viewer"),
+    ("plan",): ("auvdock.cli.plan:run", "tell where a station's lights can be seen"),
     ("reproduce", "guidance-space"): (
         "auvdock.cli.reproduce:run_guidance_space",
         "paper A's guidance-space tables beside ours",

@@ -1,0 +1,197 @@
+"""`auvdock plan STATION.toml`: where a station's lights can be seen."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from auvdock.cli.parsing import parse
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.beacons import BeaconLayout
+from auvdock.core.camera import CameraCfg
+from auvdock.core.station import ConicalStationCfg
+from auvdock.core.strict import load_toml
+from auvdock.planning.detectability import Detectability
+from auvdock.planning.pictures import Panel, draw_curves, draw_sections, section_grid
+from auvdock.planning.region import GuidanceSpace, PlanCfg, guidance_space, make_detectability
+from auvdock.planning.region_rerun import record_region
+from auvdock.planning.sweeps import SweepPoint, sweep, variants
+
+__all__ = ["Plan", "run", "section_panels"]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Where can a station's beacons be seen? Volume, range and half angle of its precise-guidance space.
+
+    The region is where at least `min-lights` array lights are found by the threshold detector in a camera that looks at
+    the station, in the light model that the renderer uses.
+    """
+
+    station: Annotated[Path, tyro.conf.Positional]
+    """TOML file of a conical station, as assets/stations/conical.toml."""
+    water: str = "pool"
+    """Water preset: I, IA, IB, II, III, 1C to 9C, clear, pool, lake."""
+    attenuation: float | None = None
+    """Beam attenuation at 450 nm in 1/m, in place of the preset's."""
+    min_lights: int = 4
+    """Array lights that must be found."""
+    resolution: int = 56
+    """Voxels along the longest side of the region."""
+    width: int = 640
+    """Image width in pixels, 16:9."""
+    sweep: bool = False
+    """Sweep over beam angle, number of lights and tilt as well."""
+    out: Path | None = None
+    """Folder for sections.png, region.rrd and sweeps.png."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def run(argv: Sequence[str], prog: str) -> int:
+    """Run the command."""
+    args = parse(Plan, argv, prog)
+    station = load_toml(ConicalStationCfg, args.station)
+    layout = station.layout
+    camera = CameraCfg(width_px=args.width, height_px=round(args.width * 9 / 16))
+    cfg = PlanCfg(args.water, args.attenuation, camera, min_lights=args.min_lights, resolution=args.resolution)
+    sees = make_detectability(layout, cfg)
+    cases = variants(station) if args.sweep else []
+    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
+    started = time.perf_counter()
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("region", total=1 + len(cases) + (3 if args.out else 0))
+        space = guidance_space(layout, cfg, sees)
+        region_s = time.perf_counter() - started
+        progress.advance(task)
+        files: list[str] = []
+        if args.out is not None:
+            title = f"{args.station.stem} in {args.water}: {space.volume_m3:.0f} m³"
+            panels = section_panels(sees, layout, space, lambda: progress.advance(task))
+            draw_sections(args.out / "sections.png", title, panels, cfg.min_lights)
+            record_region(args.out / "region.rrd", layout, {args.water: space})
+            files += ["sections.png", "region.rrd"]
+        points = sweep(cases, cfg, lambda: progress.advance(task)) if cases else []
+        if args.out is not None and points:
+            draw_curves(args.out / "sweeps.png", f"{args.station.stem} in {args.water}", _curves(points))
+            files.append("sweeps.png")
+    report = _report(args, space, region_s, points, files)
+    if args.json:
+        print(json.dumps(report, allow_nan=False))
+    else:
+        _print(report, points)
+    return 0
+
+
+def section_panels(
+    sees: Detectability,
+    layout: BeaconLayout,
+    space: GuidanceSpace,
+    tick: Any = None,  # noqa: ANN401
+) -> list[Panel]:
+    """Sections: level through the axis, upright through it, and across it at half of the range."""
+    lights = layout.array_positions_m
+
+    def count(points_m: Array) -> IntArray:
+        return sees.sighting(points_m).count
+
+    if space.region is None:
+        low, high = np.array([0.0, -5.0, -5.0]), np.array([10.0, 5.0, 5.0])
+    else:
+        low = space.region.low_m
+        high = low + np.array(space.region.inside.shape) * space.region.voxel_m
+    centre = sees.sight.target_m
+    half = float(centre[0]) + 0.5 * space.range_m
+    cuts = (
+        ("level section through the axis", (0, 1), float(centre[2])),
+        ("upright section through the axis", (0, 2), float(centre[1])),
+        (f"section across the axis at {half:.1f} m", (1, 2), half),
+    )
+    panels: list[Panel] = []
+    for title, axes, fixed in cuts:
+        one, other = (np.linspace(low[k] + 0.02, high[k], 64) for k in axes)
+        grid = section_grid(count, axes, one, other, fixed)
+        panels.append(Panel(title, "xyz"[axes[0]], "xyz"[axes[1]], one, other, grid, lights[:, axes]))
+        if tick is not None:
+            tick()
+    return panels
+
+
+def _curves(points: list[SweepPoint]) -> list[tuple[str, Array, Array]]:
+    names = {"beam_angle_deg": "beam angle [°]", "lights": "lights, equal total power", "tilt_deg": "inward tilt [°]"}
+    curves: list[tuple[str, Array, Array]] = []
+    for quantity, label in names.items():
+        rows = [(point.value, point.volume_m3) for point in points if point.quantity == quantity]
+        table = np.array(rows)
+        curves.append((label, table[:, 0], table[:, 1]))
+    return curves
+
+
+def _report(
+    args: Plan, space: GuidanceSpace, region_s: float, points: list[SweepPoint], files: list[str]
+) -> dict[str, Any]:
+    return {
+        "station": str(args.station),
+        "water": args.water,
+        "attenuation_per_m": args.attenuation,
+        "min_lights": args.min_lights,
+        "volume_m3": space.volume_m3,
+        "discretisation_error_m3": space.error_m3,
+        "voxel_m": space.region.voxel_m if space.region is not None else None,
+        "near_m": space.near_m,
+        "range_m": space.range_m,
+        "half_angle_deg": space.half_angle_deg,
+        "array_power_w": space.power_w,
+        "volume_per_watt_m3": space.volume_m3 / space.power_w,
+        "places_evaluated": space.region.evaluations if space.region is not None else 0,
+        "wall_s": region_s,
+        "sweep": [asdict(point) for point in points],
+        "files": [str(args.out / name) for name in files] if args.out is not None else [],
+    }
+
+
+def _print(report: dict[str, Any], points: list[SweepPoint]) -> None:
+    console = Console()
+    table = Table(title=f"guidance space of {report['station']} in {report['water']}", title_justify="left")
+    table.add_column("measure")
+    table.add_column("value", justify="right")
+    error = report["discretisation_error_m3"]
+    voxel = report["voxel_m"]
+    rows = (
+        ("volume", f"{report['volume_m3']:.1f} ± {error:.1f} m³ (discretisation)"),
+        ("voxel", "-" if voxel is None else f"{voxel:.2f} m"),
+        ("along the axis", f"{report['near_m']:.1f} to {report['range_m']:.1f} m"),
+        ("half angle at half range", f"{report['half_angle_deg']:.1f}°"),
+        ("array power", f"{report['array_power_w']:.0f} W"),
+        ("volume per watt", f"{report['volume_per_watt_m3']:.2f} m³/W"),
+        ("wall-clock time", f"{report['wall_s']:.1f} s"),
+    )
+    for name, value in rows:
+        table.add_row(name, value)
+    console.print(table)
+    if points:
+        table = Table(title="sweeps, the array's total power held", title_justify="left")
+        for name in ("quantity", "value", "volume m³", "range m", "half angle °", "m³/W"):
+            table.add_column(name, justify="left" if name == "quantity" else "right")
+        for point in points:
+            table.add_row(
+                point.quantity,
+                f"{point.value:g}",
+                f"{point.volume_m3:.0f}",
+                f"{point.range_m:.1f}",
+                f"{point.half_angle_deg:.0f}",
+                f"{point.volume_per_watt_m3:.2f}",
+            )
+        console.print(table)
+    for name in report["files"]:
+        console.print(name, highlight=False)
