@@ -22,6 +22,7 @@ from auvdock.core.errors import ConfigError
 __all__ = ["FilterCfg", "RelativeFilter", "RelativeState"]
 
 
+Quad = tuple[float, float, float, float]
 _lapack: Any = lapack  # its stub lists no routines
 
 
@@ -215,33 +216,45 @@ class RelativeFilter:
         R_station_body = self._R_station_body(state.axis_yaw_rad, senses)
         columns = np.array(R_station_body).reshape(3, 3) @ self._R_body_camera
         c: list[float] = columns.ravel().tolist()
-        covariance, camera, yaw = state.covariance, state.camera_m, state.axis_yaw_rad
+        camera = state.camera_m
         to_target = (target_m[0] - camera[0], target_m[1] - camera[1], target_m[2] - camera[2])
         dx, dy, dz = rotate_back((c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]), to_target)
         if dz < cfg.min_bearing_range_m:
             return state
         variance = cfg.bearing_floor_rad**2 + (cfg.entrance_spread_m / dz) ** 2
-        tx, ty, tz = -to_target[1], to_target[0], 0.0  # e_z × (target − p)
-        slopes: list[tuple[Array, float]] = []
+        tx, ty = -to_target[1], to_target[0]  # e_z × (target − p)
+        rows: list[tuple[float, float, float, float]] = []
+        misses: list[float] = []
         for column, ratio, measured in ((0, dx / dz, rx / rz), (1, dy / dz, ry / rz)):
-            # Rows of ∂(d_i/d_z)/∂(p, ψ_s).
-            a = (c[column] - ratio * c[2], c[3 + column] - ratio * c[5], c[6 + column] - ratio * c[8])
-            row = np.array([-a[0] / dz, -a[1] / dz, -a[2] / dz, (a[0] * tx + a[1] * ty + a[2] * tz) / dz])
-            slopes.append((row, measured - ratio))
-        distance = sum(miss * miss / (float(row @ covariance @ row) + variance) for row, miss in slopes)
+            # Row of ∂(d_i/d_z)/∂(p, ψ_s).
+            ax, ay = (c[column] - ratio * c[2]) / dz, (c[3 + column] - ratio * c[5]) / dz
+            rows.append((-ax, -ay, -(c[6 + column] - ratio * c[8]) / dz, ax * tx + ay * ty))
+            misses.append(measured - ratio)
+        lines: list[list[float]] = state.covariance.tolist()
+        distance = 0.0
+        for row, miss in zip(rows, misses, strict=True):
+            distance += miss * miss / (_dot(row, _times(lines, row)) + variance)
         if distance > cfg.bearing_gate:
             return state
-        shift = np.zeros(4)
-        for row, miss in slopes:
-            spread = covariance @ row
-            scale = 1.0 / (float(row @ spread) + variance)
-            shift = shift + spread * (scale * (miss - float(row @ shift)))
-            covariance = covariance - np.outer(spread, spread * scale)
-        sx, sy, sz, turn = shift.tolist()
+        shift = (0.0, 0.0, 0.0, 0.0)
+        for row, miss in zip(rows, misses, strict=True):
+            spread = _times(lines, row)
+            scale = 1.0 / (_dot(row, spread) + variance)
+            step = scale * (miss - _dot(row, shift))
+            shift = (
+                shift[0] + spread[0] * step,
+                shift[1] + spread[1] * step,
+                shift[2] + spread[2] * step,
+                shift[3] + spread[3] * step,
+            )
+            lines = [
+                [value - scale * left * right for value, right in zip(line, spread, strict=True)]
+                for line, left in zip(lines, spread, strict=True)
+            ]
         return state._replace(
-            camera_m=(camera[0] + sx, camera[1] + sy, camera[2] + sz),
-            axis_yaw_rad=math.remainder(yaw + turn, math.tau),
-            covariance=covariance,
+            camera_m=(camera[0] + shift[0], camera[1] + shift[1], camera[2] + shift[2]),
+            axis_yaw_rad=math.remainder(state.axis_yaw_rad + shift[3], math.tau),
+            covariance=np.array(lines),
         )
 
     @staticmethod
@@ -253,3 +266,18 @@ def _solve(symmetric: Array, right: Array) -> Array:
     """Solution of a symmetric positive definite system by Cholesky, straight from LAPACK: a third of NumPy's time."""
     _, solution, info = _lapack.dposv(symmetric, right)
     return solution if info == 0 else np.zeros_like(right)
+
+
+def _dot(a: Quad, b: Quad) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+
+
+def _times(matrix: list[list[float]], vector: Quad) -> Quad:
+    x, y, z, w = vector
+    a, b, c, d = matrix
+    return (
+        a[0] * x + a[1] * y + a[2] * z + a[3] * w,
+        b[0] * x + b[1] * y + b[2] * z + b[3] * w,
+        c[0] * x + c[1] * y + c[2] * z + c[3] * w,
+        d[0] * x + d[1] * y + d[2] * z + d[3] * w,
+    )
