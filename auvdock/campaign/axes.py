@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from scipy.stats import truncnorm
+from scipy.special import ndtri
 
 from auvdock.core.errors import ConfigError
 
@@ -42,7 +42,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
 DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 """`normal` has 95 % of its mass between low and high and is cut off there."""
 
-_Z95 = 1.959963984540054
+_TAIL = 0.025
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class AxisCfg:
             return math.exp(math.log(self.low) + probability * (math.log(self.high) - math.log(self.low)))
         if shape == "normal":
             middle, half = (self.low + self.high) / 2.0, (self.high - self.low) / 2.0
-            return middle + half / _Z95 * float(truncnorm.ppf(probability, -_Z95, _Z95))
+            return middle + half * float(ndtri(_TAIL + probability * (1.0 - 2.0 * _TAIL)) / ndtri(1.0 - _TAIL))
         return self.low + probability * (self.high - self.low)
 
     def changes(self, value: AxisValue) -> dict[str, Any]:

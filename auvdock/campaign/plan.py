@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from auvdock.campaign.axes import AxisValue
 from auvdock.campaign.config import CampaignCfg
@@ -94,6 +93,8 @@ class Plan:
     def _draw_design(self) -> Array | None:
         if not self._drawn or self.cfg.sampling == "random":
             return None
+        from scipy.stats import qmc  # here, because it takes half a second, which most campaigns can do without
+
         rng = np.random.default_rng(np.random.SeedSequence(self.cfg.seed, spawn_key=(_DESIGN,)))
         dimensions, episodes = len(self._drawn), self.cfg.episodes
         if self.cfg.sampling == "latin_hypercube":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.stats import binomtest
+from scipy.special import bdtr
 
 __all__ = ["McNemar", "Rate", "mcnemar", "wilson"]
 
@@ -105,7 +105,7 @@ def mcnemar(both: int, only_first: int, only_second: int, neither: int) -> McNem
     if pairs == 0:
         raise ValueError("no pairs")
     discordant = only_first + only_second
-    p_value = float(binomtest(only_first, discordant, 0.5).pvalue) if discordant else 1.0
+    p_value = min(1.0, 2.0 * float(bdtr(min(only_first, only_second), discordant, 0.5)))
     one, two = wilson(both + only_first, pairs), wilson(both + only_second, pairs)
     share_one, share_two = one.successes / pairs, two.successes / pairs
     phi = _phi(both, only_first, only_second, neither)

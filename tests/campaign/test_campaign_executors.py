@@ -1,0 +1,134 @@
+"""Executors: the same rows everywhere; deaths, hangs and exceptions stay the episode's own."""
+
+import pytest
+from campaign_jobs import Bernoulli, Raising, Troubled
+
+from auvdock.campaign.axes import AxisCfg
+from auvdock.campaign.campaign import Tally, run_campaign
+from auvdock.campaign.config import CampaignCfg
+from auvdock.campaign.errors import CampaignError
+from auvdock.campaign.executor import SerialExecutor
+from auvdock.campaign.job import DockingJob
+from auvdock.campaign.plan import Plan
+from auvdock.campaign.process import ProcessExecutor
+from auvdock.campaign.provenance import manifest_of
+from auvdock.campaign.store import Store, read_table
+from auvdock.core.errors import ConfigError
+
+AXES = (AxisCfg("current", low=0.0, high=0.5, count=3), AxisCfg("attenuation", low=0.2, high=1.2))
+SHORT = {"world": {"fidelity": "beacons", "limits": {"max_time_s": 2.0}}}
+
+
+class Silent:
+    """Watches nothing, counts."""
+
+    def __init__(self):
+        self.planned = self.before = self.rows = 0
+
+    def on_start(self, planned, tally):
+        self.planned, self.before = planned, tally.episodes
+
+    def on_row(self, row, tally):
+        self.rows += 1
+
+    def close(self):
+        pass
+
+
+def swept(folder, cfg, job, executor, resume=False):
+    store = Store(folder, cfg, manifest_of(cfg), resume)
+    summary = run_campaign(cfg, job, store, executor, Silent())
+    return summary, read_table(folder).to_pylist()
+
+
+def test_real_episodes_are_the_same_in_any_executor_number_of_workers_and_order(tmp_path):
+    cfg = CampaignCfg(episodes=6, axes=AXES, episode=SHORT)
+    _, serial = swept(tmp_path / "serial", cfg, DockingJob(cfg), SerialExecutor(60.0))
+    assert [row["episode"] for row in serial] == list(range(6))
+    assert len({row["path_length_m"] for row in serial}) == 6
+    for workers in (1, 3):
+        _, rows = swept(tmp_path / f"process{workers}", cfg, DockingJob(cfg), ProcessExecutor(workers, 60.0))
+        assert rows == serial
+    plan, run = Plan(cfg), DockingJob(cfg, cached_runners=2).build()
+    assert [run(plan[index]) for index in reversed(range(6))] == serial[::-1]
+
+
+def test_ray_gives_the_same_rows(tmp_path):
+    pytest.importorskip("ray")
+    from auvdock.campaign.ray_executor import RayExecutor
+
+    cfg = CampaignCfg(episodes=4, axes=AXES, episode=SHORT)
+    _, serial = swept(tmp_path / "serial", cfg, DockingJob(cfg), SerialExecutor(60.0))
+    _, rows = swept(tmp_path / "ray", cfg, DockingJob(cfg), RayExecutor(2, 60.0, None))
+    assert rows == serial
+
+
+def test_an_unreachable_ray_cluster_is_named():
+    pytest.importorskip("ray")
+    from auvdock.campaign.ray_executor import RayExecutor
+
+    with pytest.raises(ConfigError, match="address"):
+        RayExecutor(2, 60.0, "no-such-scheme://nowhere")
+
+
+def test_deaths_hangs_and_exceptions_cost_one_episode_each(tmp_path):
+    cfg = CampaignCfg(episodes=12, axes=AXES)
+    executor = ProcessExecutor(2, limit_s=3.0)
+    summary, rows = swept(tmp_path / "out", cfg, Troubled(str(tmp_path)), executor)
+    assert [row["episode"] for row in rows] == list(range(12))
+    failed = {row["episode"]: row["failure_reason"] for row in rows if not row["success"]}
+    assert failed == {1: "crashed", 3: "hung", 4: "crashed"}
+    assert "signal 9" in rows[1]["error"]
+    assert "3 s" in rows[3]["error"]
+    assert rows[4]["error"] == "ZeroDivisionError: no light"
+    assert summary.failures == {"crashed": 2, "hung": 1}
+    assert summary.ran == 12
+
+
+def test_the_serial_executor_ends_a_hanging_episode_too(tmp_path):
+    cfg = CampaignCfg(episodes=3)
+    _, rows = swept(tmp_path, cfg, Bernoulli(1.0, pause_s=30.0), SerialExecutor(limit_s=0.1))
+    assert [row["failure_reason"] for row in rows] == ["hung"] * 3
+
+
+def test_a_campaign_whose_every_episode_raises_stops(tmp_path):
+    cfg = CampaignCfg(episodes=500)
+    with pytest.raises(CampaignError, match="ZeroDivisionError: no light"):
+        swept(tmp_path, cfg, Raising(), SerialExecutor(60.0))
+    assert read_table(tmp_path).num_rows == 10
+
+
+def test_what_the_user_can_mend_stops_the_campaign(tmp_path):
+    cfg = CampaignCfg(episodes=500)
+    for executor in (SerialExecutor(60.0), ProcessExecutor(1, 60.0)):
+        with pytest.raises(ConfigError, match="detector"):
+            swept(tmp_path / type(executor).__name__, cfg, Raising(refuse=True), executor)
+
+
+def test_a_resumed_campaign_runs_only_what_is_missing(tmp_path):
+    cfg = CampaignCfg(episodes=60, axes=AXES)
+    log = tmp_path / "log"
+    swept(tmp_path / "out", cfg, Bernoulli(0.7, log=str(log)), SerialExecutor(60.0))
+    whole = read_table(tmp_path / "out").to_pylist()
+    longer = CampaignCfg(episodes=90, axes=AXES)
+    summary, rows = swept(tmp_path / "out", longer, Bernoulli(0.7, log=str(log)), SerialExecutor(60.0), resume=True)
+    assert sorted(int(line) for line in log.read_text(encoding="utf-8").split()) == list(range(90))
+    assert summary.ran == 30
+    assert rows[:60] == whole
+
+
+@pytest.mark.parametrize("probability", [1.0, 0.9])
+def test_the_adaptive_stop_ends_at_the_first_prefix_that_is_known_well_enough(tmp_path, probability):
+    cfg = CampaignCfg(episodes=5000, until_ci=0.03)
+    summary, rows = swept(tmp_path / "whole", cfg, Bernoulli(probability), SerialExecutor(60.0))
+    assert summary.rate.half_width <= 0.03
+    assert [row["episode"] for row in rows] == list(range(len(rows)))
+    earlier = Tally()
+    for row in rows[:-100]:
+        earlier.add(row["success"] is True, False)
+    assert earlier.rate.half_width > 0.03
+    assert len(rows) < 700  # of 5,000
+    interrupted = CampaignCfg(episodes=130, until_ci=0.03)
+    swept(tmp_path / "parts", interrupted, Bernoulli(probability), SerialExecutor(60.0))
+    _, again = swept(tmp_path / "parts", cfg, Bernoulli(probability), SerialExecutor(60.0), resume=True)
+    assert again == rows
