@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import cv2
 import tyro
 
 from auvdock.campaign.replay import StoredEpisode, stored_episode
@@ -95,6 +96,7 @@ def run_conical(argv: Sequence[str], prog: str) -> int:
     args = parse(DockConical, argv, prog, _defaults(argv, stored))
     if args.seed < 0:
         raise ConfigError("seed", args.seed, "a whole number of 0 or more")
+    cv2.setNumThreads(1)  # frames this small gain nothing from OpenCV's threads and stall on a busy machine
     runner = EpisodeRunner(args.resolve())
     if stored is not None and (runner.cfg, args.seed) != (stored.cfg, stored.spec.seed):
         stored = None  # flags made it another episode
