@@ -1,0 +1,115 @@
+"""`auvdock sweep` as a user runs it: flags, JSON, kill and resume, replay."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from auvdock.campaign.store import read_table
+from auvdock.cli.main import main
+
+FLAGS = [
+    *("--station", "conical", "--fidelity", "beacons", "--current", "0:0.4:2", "--attenuation", "0.2,0.8"),
+    *("--world.limits.max-time-s", "2", "--seed", "3"),
+]
+
+
+def command(*words):
+    return [sys.executable, "-m", "auvdock.cli", *words]
+
+
+def run(*words):
+    return subprocess.run(command(*words), capture_output=True, text=True, timeout=300, check=False)
+
+
+def test_the_last_thing_printed_is_one_json_object(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["sweep", *FLAGS, "--episodes", "4", "--out", str(out), "--executor", "serial", "--json"]) == 0
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert {"success_rate", "ci_low", "ci_high", "episodes", "failures", "wall_s", "peak_rss_mb"} <= set(found)
+    assert found["episodes"] == 4
+    assert sum(found["failures"].values()) == round(4 * (1 - found["success_rate"]))
+    assert found["ci_low"] <= found["success_rate"] <= found["ci_high"]
+    assert printed.err == ""
+    points = [(row["current"], row["attenuation"]) for row in read_table(out).to_pylist()]
+    assert sorted(points) == [(0.0, 0.2), (0.0, 0.8), (0.4, 0.2), (0.4, 0.8)]
+
+    assert main(["dock", "conical", "--from", f"{out}#2", "--json"]) in (0, 1)
+    replay = capsys.readouterr()
+    row = read_table(out).to_pylist()[2]
+    result = json.loads(replay.out)
+    assert {name: result[name] for name in row if name in result} == {name: row[name] for name in row if name in result}
+    assert "bit for bit" in replay.err
+
+    assert main(["sweep", "--out", str(out), "--resume", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"] == 4
+
+
+def test_killed_and_resumed_the_table_is_that_of_an_undisturbed_run(tmp_path):
+    flags = [*FLAGS, "--episodes", "16", "--json"]
+    assert main(["sweep", *flags, "--out", str(tmp_path / "whole"), "--executor", "serial"]) == 0
+    whole = read_table(tmp_path / "whole")
+    out = tmp_path / "killed"
+    journal = out / "journal.jsonl"
+    process = subprocess.Popen(
+        command("sweep", *flags, "--out", str(out), "--workers", "2"), start_new_session=True, stdout=subprocess.PIPE
+    )
+    started = time.monotonic()
+    while not (journal.exists() and journal.read_bytes().count(b"\n") >= 3) and process.poll() is None:
+        assert time.monotonic() - started < 200
+        time.sleep(0.005)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    kept = read_table(out).to_pylist()
+    assert len(kept) >= 3
+    done = run("sweep", "--out", str(out), "--resume", "--workers", "2", "--json")
+    assert done.returncode == 0, done.stderr
+    assert read_table(out).equals(whole)
+    assert read_table(out).to_pylist()[kept[0]["episode"]] == kept[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "field", "remedy"),
+    [
+        (["--current", "0:1"], "current", None),
+        (["--current", "0:0.5:0"], "current", "2 or more"),
+        (["--current", "fast"], "speed_m_s", "float"),
+        (["--attenuation", "1:0:3"], "attenuation", "low below high"),
+        (["--flicker", "none,awful"], "flicker", "moderate"),
+        (["--axis", "world.start.heading_deg"], "axis", "NAME=RANGE"),
+        (["--axis", "world.strat.heading_deg=0:60:4"], "strat", "start"),
+        (["--level", "0,9"], "level", "0, 1, 2, 3, 4"),
+        (["--episodes", "0"], "episodes", "1 or more"),
+        (["--workers", "0"], "workers", "1 or more"),
+        (["--seed", "-1"], "seed", "0 or more"),
+        (["--until-ci", "0.7"], "until_ci", "0.5"),
+        (["--campaign", "no-such-file.toml"], "file", "readable"),
+        (["--executor", "ray", "--address", "nonsense://x"], "address", "cluster"),
+        (["--detector", "oracle"], "detector", "threshold"),
+    ],
+)
+def test_input_that_cannot_be_used_is_named_in_one_line(tmp_path, capsys, words, field, remedy):
+    flags = ["sweep", "--fidelity", "beacons", "--out", str(tmp_path / "out"), "--executor", "serial", *words]
+    if remedy is None:
+        assert main([*flags, "--episodes", "1", "--world.limits.max-time-s", "0.2", "--json"]) == 0
+        return
+    assert main([*flags, "--json"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert len(printed.err.splitlines()) == 1
+    assert field in printed.err
+    assert remedy in printed.err
+
+
+def test_where_the_output_is_no_terminal_lines_are_plain(tmp_path, capsys):
+    assert main(["sweep", *FLAGS, "--episodes", "2", "--out", str(tmp_path / "out"), "--executor", "serial"]) == 0
+    lines = capsys.readouterr().err
+    assert "\x1b" not in lines
+    assert "\r" not in lines
+    assert "2/2 episodes" in lines
+    assert "left  success" in lines
