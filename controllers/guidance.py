@@ -46,6 +46,8 @@ class GuidanceCfg:
     """σ of the integral line of sight, in 1/s against an integral in m s; 0 turns integral action off."""
     assumed_range_m: float = 15.0
     """Range at which the long-range lamp's height above the axis is allowed for while no range is known."""
+    sight_smoothing: float = 0.08
+    """Weight of a new bearing against the smoothed one: 0.08 at 30 Hz averages over some 0.4 s."""
     max_vertical_speed_m_s: float = 0.3
     """Greatest vertical speed towards a bearing."""
     corridor_m: float = 0.3

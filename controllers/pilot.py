@@ -34,6 +34,7 @@ from auvdock.controllers.steering import (
     back_off,
     search,
     search_pattern,
+    sighted,
     towards_light,
 )
 from auvdock.core.camera import Camera
@@ -216,9 +217,8 @@ class ConicalPilot:
         azimuth, elevation = self._world_direction(bearing, senses)
         if not math.isfinite(azimuth + elevation):
             return sight
-        frames = 1 if sight is None else sight.frames + 1
         range_m = bearing.range_m if bearing.range_m is not None and math.isfinite(bearing.range_m) else None
-        return Sight(frames, senses.time_s, azimuth, elevation, range_m)
+        return sighted(sight, senses.time_s, azimuth, elevation, range_m, self.cfg.guidance.sight_smoothing)
 
     def _world_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
         x, y, z = bearing.ray_camera.tolist()
@@ -256,20 +256,20 @@ class ConicalPilot:
 
     def _facts(self, state: PilotState, place: Place | None, senses: Senses, jumped: bool) -> Facts:
         now, relative, sight = senses.time_s, state.relative, state.sight
-        far_away = place is None
+        least_m = self.cfg.modes.min_blind_range_m
         return Facts(
             latched=senses.latched,
             fixes=relative.fixes if relative is not None else 0,
             since_fix_s=relative.since_fix_s if relative is not None else math.inf,
             jumped=jumped,
-            distance_m=math.inf if far_away else place.distance_m,
-            off_axis_m=math.inf if far_away else place.off_axis_m,
-            allowed_m=math.inf if far_away else corridor_m(place.distance_m, self.cfg.guidance),
-            heading_error_rad=math.inf if far_away else abs(place.offset_rad - state.offset_rad),
+            distance_m=math.inf if place is None else place.distance_m,
+            off_axis_m=math.inf if place is None else place.off_axis_m,
+            allowed_m=math.inf if place is None else corridor_m(place.distance_m, self.cfg.guidance),
+            heading_error_rad=math.inf if place is None else abs(place.offset_rad - state.offset_rad),
             sigma_m=relative.cross_track_sigma_m if relative is not None else math.inf,
             sights=sight.frames if sight is not None else 0,
             since_sight_s=now - sight.time_s if sight is not None else math.inf,
-            range_m=sight.range_m if sight is not None and now - sight.time_s < 1.0 else None,
+            range_m=sight.trusted_range_m(least_m) if sight is not None and now - sight.time_s < 1.0 else None,
             in_mode_s=now - (state.since_s or 0.0),
             held_s=now - state.gate_s if state.gate_s is not None else 0.0,
             stalled_s=now - state.best_s,
@@ -308,7 +308,15 @@ class ConicalPilot:
         current = state.autopilot.current_m_s or (0.0, 0.0, 0.0)
         in_mode_s = senses.time_s - (state.since_s or 0.0)
         if mode == FAR and state.sight is not None:
-            return towards_light(state.sight, self._lamp_height_m, senses, current, self._reach_m_s, cfg.guidance)
+            return towards_light(
+                state.sight,
+                self._lamp_height_m,
+                senses,
+                current,
+                self._reach_m_s,
+                cfg.modes.min_blind_range_m,
+                cfg.guidance,
+            )
         if mode in (MID, NEAR, TERMINAL) and place is not None and state.relative is not None:
             blind = state.relative.since_fix_s > 2.0 * cfg.modes.fresh_s
             at_gate = place.distance_m < cfg.modes.gate_distance_m

@@ -23,6 +23,7 @@ __all__ = [
     "back_off",
     "search",
     "search_pattern",
+    "sighted",
     "towards_light",
 ]
 
@@ -60,9 +61,10 @@ class Sight(NamedTuple):
     Attributes:
         frames: frames in a row with it.
         time_s: when it was last seen.
-        azimuth_rad: world direction to it, positive to port.
-        elevation_rad: positive up.
-        range_m: rough range, None if unknown.
+        azimuth_rad: world direction to it, positive to port, smoothed.
+        elevation_rad: positive up, smoothed.
+        range_m: rough range, smoothed, None if unknown.
+        widest_m: the greatest smoothed range since the light was found.
     """
 
     frames: int
@@ -70,6 +72,34 @@ class Sight(NamedTuple):
     azimuth_rad: float
     elevation_rad: float
     range_m: float | None
+    widest_m: float = 0.0
+
+    def trusted_range_m(self, least_m: float) -> float | None:
+        """The range if it was once twice `least_m`: drifting particles look like a group that is always near."""
+        return self.range_m if self.widest_m >= 2.0 * least_m else None
+
+
+def sighted(
+    last: Sight | None, time_s: float, azimuth_rad: float, elevation_rad: float, range_m: float | None, smoothing: float
+) -> Sight:
+    """The sight after one more frame: a running mean that turns into an exponential one with weight `smoothing`."""
+    if last is None or time_s - last.time_s > 3.0:
+        return Sight(1, time_s, azimuth_rad, elevation_rad, range_m, range_m or 0.0)
+    frames = last.frames + 1
+    weight = max(smoothing, 1.0 / frames)
+    azimuth = last.azimuth_rad + weight * math.remainder(azimuth_rad - last.azimuth_rad, math.tau)
+    if range_m is None:
+        ranged = last.range_m
+    else:
+        ranged = range_m if last.range_m is None else last.range_m + weight * (range_m - last.range_m)
+    return Sight(
+        frames,
+        time_s,
+        math.remainder(azimuth, math.tau),
+        last.elevation_rad + weight * (elevation_rad - last.elevation_rad),
+        ranged,
+        max(last.widest_m, ranged or 0.0),
+    )
 
 
 class Place(NamedTuple):
@@ -163,6 +193,7 @@ def towards_light(
     senses: Senses,
     current_m_s: Vector,
     reach_m_s: float,
+    least_range_m: float,
     cfg: GuidanceCfg,
 ) -> Steering:
     """Pure pursuit of a bearing: course along its azimuth over ground, height by its elevation.
@@ -170,12 +201,14 @@ def towards_light(
     A lone lamp hangs `lamp_height_m` above the axis, so at range R the wanted elevation is atan(h/R); R is the rough
     range if known, else `assumed_range_m`. A group whose range is known is the array about the axis itself.
     """
-    known = sight.range_m is not None
-    wanted = 0.0 if known else math.atan2(lamp_height_m, cfg.assumed_range_m)
+    range_m = sight.trusted_range_m(least_range_m)
+    wanted = 0.0 if range_m is not None else math.atan2(lamp_height_m, cfg.assumed_range_m)
     turn = math.remainder(sight.azimuth_rad - senses.yaw_rad, math.tau)
     speed = cfg.far_speed_m_s * min(1.0, max(0.0, 1.6 - 1.5 * abs(turn)))
-    if sight.range_m is not None:
-        speed = min(speed, max(0.15, 0.12 * (sight.range_m - 2.0)))
+    if range_m is not None:
+        speed = min(speed, max(0.15, 0.12 * (range_m - 2.0)))
+    elif sight.range_m is not None:
+        speed = min(speed, cfg.mid_speed_m_s)
     climb = max(speed, 0.3) * math.tan(min(0.7, max(-0.7, sight.elevation_rad - wanted)))
     climb = _clip(climb, cfg.max_vertical_speed_m_s)
     setpoint, offset = _ground_course(
