@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -21,9 +22,10 @@ from auvdock.envs.config import WorldCfg
 from auvdock.envs.world import DockingWorld
 from auvdock.perception.detectors import make_detector
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
+from auvdock.planning.pictures import Panel, draw_sections, section_grid
 from auvdock.planning.region import PlanCfg, guidance_space, make_detectability
 
-__all__ = ["Agreement", "PixelEye", "check_grid", "check_region"]
+__all__ = ["Agreement", "PixelEye", "check_grid", "check_region", "draw_agreement"]
 
 FRAMES = 6
 SETTLING_FRAMES = 3
@@ -111,7 +113,11 @@ def check_grid(water: str, step_m: float, plan: PlanCfg | None = None) -> tuple[
 
 
 def check_region(
-    water: str, step_m: float, tick: Callable[[int], object] | None = None, workers: int | None = None
+    water: str,
+    step_m: float,
+    tick: Callable[[int], object] | None = None,
+    workers: int | None = None,
+    grid: tuple[Array, BoolArray] | None = None,
 ) -> Agreement:
     """Plan and pixels on a grid in one water.
 
@@ -120,8 +126,9 @@ def check_region(
         step_m: grid step.
         tick: called with the number of places done since the last call.
         workers: processes; by default one per core.
+        grid: what `check_grid` gave, if it is at hand.
     """
-    places, planned = check_grid(water, step_m)
+    places, planned = grid or check_grid(water, step_m)
     seen = np.zeros(len(places), dtype=np.bool_)
     batches = [np.arange(start, min(start + _BATCH, len(places))) for start in range(0, len(places), _BATCH)]
     with ProcessPoolExecutor(workers or os.cpu_count() or 1) as pool:
@@ -131,6 +138,38 @@ def check_region(
             if tick is not None:
                 tick(len(jobs[done]))
     return Agreement(water, places, planned, seen, step_m**3)
+
+
+def draw_agreement(path: Path, agreement: Agreement) -> None:
+    """A picture: sections through the planned region with the rendered places of the nearest layer of the grid.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    station = WorldCfg().station
+    sees = make_detectability(station.layout, PlanCfg(water=agreement.water))
+    lights = station.layout.array_positions_m
+    places = np.vstack([agreement.places_m, agreement.places_m * np.array([1.0, -1.0, 1.0])])
+    seen = np.concatenate([agreement.seen, agreement.seen]).astype(np.float64)
+    half_x = 0.5 * float(agreement.places_m[:, 0].max())
+    panels: list[Panel] = []
+    for name, axes, third, wanted in (
+        ("level", (0, 1), 2, 0.0),
+        ("upright", (0, 2), 1, 0.0),
+        ("cross", (1, 2), 0, half_x),
+    ):
+        layers = np.unique(places[:, third])
+        fixed = float(layers[np.argmin(np.abs(layers - wanted))])
+        here = np.abs(places[:, third] - fixed) < 1e-6
+        across, up = (np.linspace(places[:, k].min() - 0.5, places[:, k].max() + 0.5, 72) for k in axes)
+        if axes[0] == 0:
+            across = np.linspace(0.02, float(places[:, 0].max()) + 0.5, 72)
+        count = section_grid(lambda points: sees.sighting(points).count, axes, across, up, fixed)
+        checked = np.column_stack([places[here][:, axes], seen[here]])
+        title = f"{name} section at {'xyz'[third]} = {fixed:.1f} m"
+        panels.append(Panel(title, "xyz"[axes[0]], "xyz"[axes[1]], across, up, count, lights[:, axes], checked))
+    ratio = agreement.intersection_over_union
+    draw_sections(path, f"planned and rendered, {agreement.water}: intersection over union {ratio:.2f}", panels, 4)
 
 
 def _seen(water: str, places: Array) -> list[bool]:

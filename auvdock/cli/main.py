@@ -20,6 +20,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.reproduce:run_guidance_space",
         "paper A's guidance-space tables beside ours",
     ),
+    ("reproduce", "guidance-region"): (
+        "auvdock.cli.reproduce:run_guidance_region",
+        "the planned guidance space beside rendered frames",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -21,8 +22,9 @@ from auvdock.experiments.guidance_space import (
     reproduce,
     task_count,
 )
+from auvdock.experiments.guidance_space_check import check_grid, check_region, draw_agreement
 
-__all__ = ["GuidanceSpace", "run_guidance_space"]
+__all__ = ["GuidanceRegion", "GuidanceSpace", "run_guidance_region", "run_guidance_space"]
 
 
 @dataclass(frozen=True)
@@ -105,3 +107,66 @@ def _print(cells: Sequence[CellResult], readings: Sequence[ReadingResult], withi
         )
     console.print(table)
     console.print(f"{within} of {len(cells)} cells within {TOLERANCE_M3:g} m³ of the paper's")
+
+
+@dataclass(frozen=True)
+class GuidanceRegion:
+    """The planned guidance space beside the one in which the pixel pipeline really finds four beacons.
+
+    Renders a few frames at each place of a grid and runs detector and authentication on them; needs OpenGL.
+    Exit code: 0 if intersection over union is 0.8 or more in every water, 1 if not.
+    """
+
+    waters: tuple[str, ...] = ("pool", "lake")
+    """Water presets."""
+    steps: tuple[float, ...] = (2.2, 1.4)
+    """Grid step in m for each water."""
+    out: Path | None = None
+    """Folder for a picture of each water: guidance_region_WATER.png."""
+    workers: int | None = None
+    """Processes; by default one per core."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def run_guidance_region(argv: Sequence[str], prog: str) -> int:
+    """Run the command."""
+    args = parse(GuidanceRegion, argv, prog)
+    if len(args.steps) != len(args.waters) or not all(0.2 <= step <= 20.0 for step in args.steps):
+        raise ConfigError("steps", args.steps, "one grid step of 0.2 to 20 m for each water")
+    if args.workers is not None and args.workers < 1:
+        raise ConfigError("workers", args.workers, "1 or more")
+    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
+    rows: list[dict[str, Any]] = []
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+        for water, step_m in zip(args.waters, args.steps, strict=True):
+            grid = check_grid(water, step_m)
+            task = progress.add_task(f"poses in {water}", total=len(grid[0]))
+            agreement = check_region(water, step_m, lambda done: progress.advance(task, done), args.workers, grid)  # noqa: B023
+            picture = None
+            if args.out is not None:
+                picture = args.out / f"guidance_region_{water}.png"
+                draw_agreement(picture, agreement)
+            rows.append(
+                {
+                    "water": water,
+                    "step_m": step_m,
+                    "places": len(agreement.places_m),
+                    "planned": int(agreement.planned.sum()),
+                    "seen": int(agreement.seen.sum()),
+                    "intersection_over_union": agreement.intersection_over_union,
+                    "picture": str(picture) if picture is not None else None,
+                }
+            )
+    good = all(row["intersection_over_union"] >= 0.8 for row in rows)
+    if args.json:
+        print(json.dumps({"waters": rows, "target": 0.8}, allow_nan=False))
+        return 0 if good else 1
+    table = Table(title="planned region against rendered frames", title_justify="left")
+    for name in ("water", "places", "planned", "seen", "intersection over union"):
+        table.add_column(name, justify="left" if name == "water" else "right")
+    for row in rows:
+        ratio = row["intersection_over_union"]
+        table.add_row(row["water"], str(row["places"]), str(row["planned"]), str(row["seen"]), f"{ratio:.3f}")
+    Console().print(table)
+    return 0 if good else 1

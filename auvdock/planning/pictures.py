@@ -85,7 +85,9 @@ def draw_sections(path: Path, title: str, panels: list[Panel], needed: int) -> N
         axes.set_xlabel(f"{panel.across} [m]")
         axes.set_ylabel(f"{panel.up} [m]")
         axes.set_aspect("equal")
-        axes.legend(loc="lower right", fontsize=7)
+        if index == 0:
+            handles, labels = axes.get_legend_handles_labels()
+            figure.legend(handles, labels, loc="outside lower left", ncols=len(labels), fontsize=8)
     if image is not None:
         figure.colorbar(image, ax=figure.axes, label="array lights found", ticks=range(9), shrink=0.8)
     save_figure(figure, path)
