@@ -105,7 +105,7 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
         centre_floor_px=floor,
         centre_at_100=noise,
         score_gain=float(np.median(gain)) if len(gain) else 1.0,
-        false_alarms=alarms / max(sum(veiled_share(item.seen) for item in observations), 1.0),
+        false_alarms=alarms / max(float(sum(veiled_share(item.seen) for item in observations)), 1.0),
         wrong_colour=float(np.mean(np.concatenate(wrong))) if len(gain) else 0.0,
     )
 

@@ -73,7 +73,7 @@ class Lens:
         x2y2 = xy * xy
         r2 = x2y2[:, 0] + x2y2[:, 1]
         limit = self._max_tangent2 * (1.0 + margin_px * self.rad_per_px) ** 2
-        inside = r2 <= limit
+        inside = (r2 <= limit) & (rays[:, 2] > 0.0)
         np.minimum(r2, limit, out=r2)
         if self._radial is not None:
             # `Camera.project` without its tangential terms, at a third of its cost for a handful of points.

@@ -77,7 +77,7 @@ class LitScene:
         strangers = self._strangers(self._streams["interfering_lights"])
         if strangers or self.lights.count != self.lights.station_count:
             self._set_lights(strangers)
-        n = self.lights.count
+        n = self.lights.station_count
         self._log = self._streams["flicker"].standard_normal(n)
         self._dark_until = np.full(n, -np.inf)
         self._occluded_until = np.full(n, -np.inf)
@@ -105,7 +105,7 @@ class LitScene:
         T_world_camera = T_world_body @ self.camera.T_body_camera
         received = self.lights.received(self._T_station_world @ T_world_camera)
         if self._fluctuates:
-            factor = self._fluctuate(time_s, received.range_m)
+            factor = self._fluctuate(time_s, received.range_m)[self._source]
             received.core_w_m2[:] *= factor
             received.halo_w_m2[:] *= factor
         if self._mirrors:
@@ -123,9 +123,14 @@ class LitScene:
         return light @ self.lights.electrons_per_j / float(light.sum()) * self.lens.aperture_m2
 
     def _set_lights(self, strangers: tuple[BeaconCfg, ...]) -> None:
-        images = self._images() if self._mirrors else ()
+        mirrored = [k for k, beacon in enumerate(self.layout.beacons) if beacon.role != "entrance"]
+        images = self._images(mirrored) if self._mirrors else ()
         self.lights = LightSet(self.layout, self.water, (*strangers, *images))
         self._image_slice = slice(self.lights.count - len(images), self.lights.count)
+        own = self.lights.station_count
+        # Whose fluctuation each light shares: its own, none (the last entry), or that of the lamp it mirrors.
+        source = [*range(own), *(own for _ in strangers), *mirrored[: len(images)]]
+        self._source = np.array(source, dtype=np.int64)
         self.spots = SpotModel(self.lens, self.lights, self.water, self.cfg)
 
     def _strangers(self, rng: np.random.Generator) -> tuple[BeaconCfg, ...]:
@@ -140,14 +145,13 @@ class LitScene:
             lamps.append(BeaconCfg(f"stranger{index}", "array", place, (1.0, 0.0, 0.0), nm, level.power_w, 0.35, 90.0))
         return tuple(lamps)
 
-    def _images(self) -> tuple[BeaconCfg, ...]:
-        """The station's lamps mirrored in the surface z = 0, those inside the funnel left out."""
+    def _images(self, mirrored: list[int]) -> tuple[BeaconCfg, ...]:
+        """Some of the station's lamps mirrored in the surface z = 0; those inside the funnel do not shine there."""
         images: list[BeaconCfg] = []
         rotation, origin = self.T_world_station[:3, :3], self.T_world_station[:3, 3]
         flip = np.array([1.0, 1.0, -1.0])
-        for beacon, position, axis in zip(self.layout.beacons, self.layout.positions_m, self.layout.axes, strict=True):
-            if beacon.role == "entrance":
-                continue
+        for k in mirrored:
+            beacon, position, axis = self.layout.beacons[k], self.layout.positions_m[k], self.layout.axes[k]
             place = rotation.T @ (flip * (rotation @ position + origin) - origin)
             way = rotation.T @ (flip * (rotation @ axis))
             images.append(
@@ -176,15 +180,16 @@ class LitScene:
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
 
     def _fluctuate(self, time_s: float, range_m: Array) -> Array:
+        """(station's lamps + 1,) factors on their light; the last entry is 1."""
         flicker, snow = self.nuisance.flicker_level, self.nuisance.snow_level
-        n = self.lights.count
+        n = self.lights.station_count
         step = 0.0 if self._last_s is None else max(time_s - self._last_s, 0.0)
         self._last_s = time_s
         stream = self._streams["flicker"]
         keep = math.exp(-step / flicker.correlation_s)
         self._log *= keep
         self._log += math.sqrt(1.0 - keep * keep) * stream.standard_normal(n)
-        std = flicker.log_std_at_10_m * np.sqrt(range_m / 10.0)
+        std = flicker.log_std_at_10_m * np.sqrt(range_m[:n] / 10.0)
         factor = np.exp(std * self._log - 0.5 * std * std)
         draws = stream.random((2, n))
         starts = draws[0] < 1.0 - math.exp(-flicker.dropouts_per_s * step)
@@ -196,7 +201,7 @@ class LitScene:
         ends = time_s - snow.occlusion_s * np.log(np.maximum(draws[1], 1e-12))
         self._occluded_until[starts] = ends[starts]
         factor[self._occluded_until > time_s] *= snow.occlusion_transmission
-        return factor
+        return np.append(factor, 1.0)
 
 
 def _fresnel_from_water(cosine: Array) -> Array:

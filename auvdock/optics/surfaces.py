@@ -110,12 +110,13 @@ class Surfaces:
         depth_m = -float(T_world_camera[2, 3])
         daylight = self._lit.daylight_w_m2(depth_m)
         veil = self._lit.veil_w_m2_sr(depth_m)
+        # Beyond this nothing but veil is left, and e^x would run into slow denormal numbers.
+        np.minimum(distance, np.float32(80.0 / max(float(self._beta_direct.max()), 0.1)), out=distance)
         light = self._lamp_light(T_world_camera, distance)
         light += daylight.astype(np.float32)
         light = cv2.resize(light, (self.shape[1], self.shape[0]), interpolation=cv2.INTER_LINEAR)
         albedo = cv2.cvtColor(colour, cv2.COLOR_RGB2BGR)
         scene = cv2.multiply(albedo, light, scale=1.0 / (255.0 * math.pi), dtype=cv2.CV_32F)
-        np.minimum(distance, np.float32(1e3), out=distance)
         path = np.repeat(distance[:, :, None], 3, axis=2)
         through = cv2.exp(path * (-self._beta_direct).astype(np.float32))
         image = np.asarray(cv2.multiply(scene, through), dtype=np.float32)
@@ -128,7 +129,6 @@ class Surfaces:
         """Spill light of the lamps (rows, columns, 3) on what is seen, per band, on the coarse grid of the lens."""
         rows, columns = self._lit.lens.shape
         z = cv2.resize(distance, (columns, rows), interpolation=cv2.INTER_NEAREST).reshape(-1, 1)
-        np.minimum(z, np.float32(1e3), out=z)
         points = self._rays * z
         lamps = ((self._lamps - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]).astype(np.float32)
         d2 = points @ (-2.0 * lamps.T)
