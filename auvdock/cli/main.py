@@ -24,6 +24,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.reproduce:run_guidance_region",
         "the planned guidance space beside rendered frames",
     ),
+    ("reproduce", "guidance-design"): (
+        "auvdock.cli.plan_design:run_guidance_design",
+        "optimised arrays against paper A's ring of six",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),

@@ -1,0 +1,149 @@
+"""`auvdock reproduce guidance-design`: optimised arrays against the paper's ring of six at equal power."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from auvdock.cli.parsing import parse
+from auvdock.core.errors import ConfigError
+from auvdock.core.station import load_conical_station
+from auvdock.experiments.guidance_space_design import (
+    Campaign,
+    PaperComparison,
+    PhysicalComparison,
+    compare_paper,
+    compare_physical,
+    default_search,
+    design_rows,
+    dock_campaign,
+    draw_comparison,
+)
+from auvdock.planning.station_file import write_station
+
+__all__ = ["GuidanceDesign", "run_guidance_design"]
+
+
+@dataclass(frozen=True)
+class GuidanceDesign:
+    """Six lights placed by the optimiser against the paper's ring (45°, +6°), at equal power.
+
+    In paper A's model and in the physical one, and docking campaigns with both arrays in the physical one.
+    Exit code: 0 if the optimised arrays have the greater guidance space in both models, 1 if not.
+    """
+
+    water: str = "pool"
+    """Water preset of the physical model."""
+    episodes: int = 24
+    """Docking episodes with each array; 0 leaves them out."""
+    seed: int = 0
+    """Of the search."""
+    out: Path | None = None
+    """Folder for guidance_design.png and the optimised station's file."""
+    workers: int | None = None
+    """Processes of the docking campaigns; by default one per core."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def run_guidance_design(argv: Sequence[str], prog: str) -> int:
+    """Run the command."""
+    args = parse(GuidanceDesign, argv, prog)
+    if args.episodes < 0:
+        raise ConfigError("episodes", args.episodes, "0 or more")
+    if args.seed < 0:
+        raise ConfigError("seed", args.seed, "a whole number of 0 or more")
+    if args.workers is not None and args.workers < 1:
+        raise ConfigError("workers", args.workers, "1 or more")
+    cfg = default_search()
+    layouts = cfg.population * (cfg.generations + 1)
+    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
+    campaigns: list[Campaign] = []
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("layouts in paper A's model", total=layouts)
+        paper = compare_paper(cfg, args.seed, lambda: progress.advance(task))
+        second = progress.add_task(f"layouts in {args.water}", total=layouts)
+        physical = compare_physical(args.water, cfg, args.seed, lambda: progress.advance(second))
+        if args.episodes:
+            stations = {"paper's ring": load_conical_station(), "optimised": physical.station}
+            third = progress.add_task("docking campaigns", total=2)
+            for name, station in stations.items():
+                campaigns.append(dock_campaign(name, station, args.water, args.episodes, workers=args.workers))
+                progress.advance(third)
+    files: list[str] = []
+    if args.out is not None:
+        draw_comparison(args.out / "guidance_design.png", physical, paper)
+        write_station(args.out / f"optimised_{args.water}.toml", physical.station)
+        files = [str(args.out / name) for name in ("guidance_design.png", f"optimised_{args.water}.toml")]
+    report = _report(paper, physical, campaigns, files)
+    if args.json:
+        print(json.dumps(report, allow_nan=False))
+    else:
+        _print(report)
+    better = paper.best_m3 > paper.ring_m3 and physical.best.volume_m3 > physical.ring.volume_m3
+    return 0 if better else 1
+
+
+def _report(
+    paper: PaperComparison, physical: PhysicalComparison, campaigns: list[Campaign], files: list[str]
+) -> dict[str, Any]:
+    return {
+        "paper_a_model": {
+            "ring_m3": paper.ring_m3,
+            "optimised_m3": paper.best_m3,
+            "gain": paper.best_m3 / paper.ring_m3 - 1.0,
+            "ring_voxel_m3": paper.ring_voxel_m3,
+            "optimised_voxel_m3": paper.best_voxel_m3,
+            "beam_deg": paper.found.design.beam_deg,
+            "lights": design_rows(paper.found.design),
+            "layouts_tried": paper.found.evaluations,
+        },
+        "physical_model": {
+            "water": physical.water,
+            "ring_m3": physical.ring.volume_m3,
+            "ring_error_m3": physical.ring.error_m3,
+            "optimised_m3": physical.best.volume_m3,
+            "optimised_error_m3": physical.best.error_m3,
+            "gain": physical.best.volume_m3 / physical.ring.volume_m3 - 1.0,
+            "ring_range_m": physical.ring.range_m,
+            "optimised_range_m": physical.best.range_m,
+            "power_w": physical.found.power_w,
+            "beam_deg": physical.found.design.beam_deg,
+            "lights": design_rows(physical.found.design),
+            "layouts_tried": physical.found.evaluations,
+        },
+        "campaigns": [asdict(campaign) for campaign in campaigns],
+        "files": files,
+    }
+
+
+def _print(report: dict[str, Any]) -> None:
+    console = Console()
+    table = Table(title="six lights, equal power", title_justify="left")
+    for name in ("model", "paper's ring m³", "optimised m³", "gain", "beam °"):
+        table.add_column(name, justify="left" if name == "model" else "right")
+    for key, name in (("paper_a_model", "paper A's"), ("physical_model", "physical")):
+        row = report[key]
+        table.add_row(
+            name, f"{row['ring_m3']:.1f}", f"{row['optimised_m3']:.1f}", f"{row['gain']:+.1%}", f"{row['beam_deg']:.0f}"
+        )
+    console.print(table)
+    if report["campaigns"]:
+        table = Table(title="docking campaigns, beacons fidelity", title_justify="left")
+        names = ("array", "docked", "first pose m", "precise range m", "distortion", "pose error m", "time s")
+        for name in names:
+            table.add_column(name, justify="left" if name == "array" else "right")
+        for row in report["campaigns"]:
+            figures = ("entry_distance_m", "precise_range_m", "distortion_rate", "pose_error_m", "time_s")
+            values = ["-" if row[key] is None else f"{row[key]:.3f}" for key in figures]
+            table.add_row(row["name"], f"{row['docked']}/{row['episodes']}", *values)
+        console.print(table)
+    for name in report["files"]:
+        console.print(name, highlight=False)
