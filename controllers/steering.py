@@ -65,6 +65,7 @@ class Sight(NamedTuple):
         elevation_rad: positive up, smoothed.
         range_m: rough range, smoothed, None if unknown.
         widest_m: the greatest smoothed range since the light was found.
+        looks: frames that the means rest on; gaps of up to 3 s do not end them.
     """
 
     frames: int
@@ -73,6 +74,7 @@ class Sight(NamedTuple):
     elevation_rad: float
     range_m: float | None
     widest_m: float = 0.0
+    looks: int = 1
 
     def trusted_range_m(self, least_m: float) -> float | None:
         """The range if it was once twice `least_m`: drifting particles look like a group that is always near."""
@@ -82,23 +84,31 @@ class Sight(NamedTuple):
 def sighted(
     last: Sight | None, time_s: float, azimuth_rad: float, elevation_rad: float, range_m: float | None, smoothing: float
 ) -> Sight:
-    """The sight after one more frame: a running mean that turns into an exponential one with weight `smoothing`."""
+    """The sight after one more frame: a running mean that turns into an exponential one with weight `smoothing`.
+
+    The range, the noisier part, is averaged four times as long, and judged (`widest_m`) only once the mean has settled.
+    """
     if last is None or time_s - last.time_s > 3.0:
-        return Sight(1, time_s, azimuth_rad, elevation_rad, range_m, range_m or 0.0)
-    frames = last.frames + 1
-    weight = max(smoothing, 1.0 / frames)
+        return Sight(1, time_s, azimuth_rad, elevation_rad, range_m)
+    looks = last.looks + 1
+    weight = max(smoothing, 1.0 / looks)
     azimuth = last.azimuth_rad + weight * math.remainder(azimuth_rad - last.azimuth_rad, math.tau)
     if range_m is None:
         ranged = last.range_m
     else:
-        ranged = range_m if last.range_m is None else last.range_m + weight * (range_m - last.range_m)
+        ranged = (
+            range_m
+            if last.range_m is None
+            else last.range_m + max(0.25 * smoothing, 1.0 / looks) * (range_m - last.range_m)
+        )
     return Sight(
-        frames,
+        last.frames + 1,
         time_s,
         math.remainder(azimuth, math.tau),
         last.elevation_rad + weight * (elevation_rad - last.elevation_rad),
         ranged,
-        max(last.widest_m, ranged or 0.0),
+        max(last.widest_m, ranged or 0.0) if looks * smoothing > 2.0 else 0.0,
+        looks,
     )
 
 

@@ -19,7 +19,7 @@ from auvdock.controllers.guidance import (
     sway_reach_m_s,
 )
 from auvdock.controllers.linear_model import hydrodynamic_wrench
-from auvdock.controllers.steering import SearchCfg, search, search_pattern
+from auvdock.controllers.steering import SearchCfg, search, search_pattern, sighted
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import load_vehicle
 
@@ -127,3 +127,28 @@ def test_settings_without_meaning_are_refused():
         GuidanceCfg(lookahead_mid_m=0.0)
     with pytest.raises(ConfigError, match="amplitudes_rad"):
         SearchCfg(amplitudes_rad=())
+
+
+def test_smoothed_sight_averages_noise_and_follows_across_the_date_line():
+    rng, sight = np.random.default_rng(0), None
+    for step in range(300):
+        azimuth = math.remainder(math.pi + 0.2 * rng.standard_normal(), math.tau)
+        sight = sighted(sight, step / 30.0, azimuth, 0.1, None, 0.08)
+    assert sight is not None
+    assert abs(math.remainder(sight.azimuth_rad - math.pi, math.tau)) < 0.12
+    assert sight.elevation_rad == pytest.approx(0.1)
+    assert sight.frames == 300
+
+
+def test_a_range_that_never_was_great_is_not_trusted():
+    """Particles before the lens look like a group two metres off for ever; a station comes nearer from afar."""
+    rng = np.random.default_rng(1)
+    snow = station = None
+    for step in range(600):
+        noise = math.exp(0.4 * rng.standard_normal())
+        snow = sighted(snow, step / 30.0, 0.0, 0.0, 2.2 * noise, 0.08)
+        station = sighted(station, step / 30.0, 0.0, 0.0, max(2.0, 12.0 - step / 40.0) * noise, 0.08)
+    assert snow is not None
+    assert station is not None
+    assert snow.trusted_range_m(3.0) is None
+    assert station.trusted_range_m(3.0) == pytest.approx(2.2, abs=0.8)
