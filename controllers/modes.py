@@ -7,7 +7,7 @@
 | acquire | far | the long-range light is seen steadily |
 | far | mid | as above |
 | far | acquire | no light for `sight_lost_s` |
-| far | abort | a light group nearer than `min_blind_range_m` and still no pose |
+| far | abort | a light group nearer than `min_blind_range_m` and still no pose; or `far_timeout_s` is over |
 | mid | near | nose at the gate, inside the corridor, pose fresh |
 | mid | far, acquire | no pose for `pose_lost_s`, still beyond `commit_distance_m`; by whether a light is seen |
 | mid | abort | closer than that: no pose for `pose_lost_s`, or poses jump |
@@ -69,6 +69,8 @@ class ModeCfg:
     """A pose is fresh this long."""
     sight_lost_s: float = 3.0
     """Far ends when no light was seen for this long."""
+    far_timeout_s: float = 90.0
+    """Longest far: a lamp that leads on for longer is none."""
     min_blind_range_m: float = 3.0
     """Far is aborted when the lights seem nearer than this and no pose has come."""
     pose_lost_s: float = 4.0
@@ -183,7 +185,8 @@ def next_mode(mode: str, facts: Facts, cfg: ModeCfg) -> str:
 def _after_far(facts: Facts, cfg: ModeCfg, has_pose: bool) -> str:
     if has_pose:
         return MID
-    if facts.range_m is not None and facts.range_m < cfg.min_blind_range_m:
+    too_near = facts.range_m is not None and facts.range_m < cfg.min_blind_range_m
+    if too_near or facts.in_mode_s > cfg.far_timeout_s:
         return ABORT
     return ACQUIRE if facts.since_sight_s > cfg.sight_lost_s else FAR
 

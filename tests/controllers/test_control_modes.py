@@ -119,6 +119,7 @@ def test_nobody_commits_itself_outside_the_corridor(now):
         (FAR, {"fixes": 0, "since_fix_s": math.inf}, FAR),
         (FAR, {"fixes": 0, "since_fix_s": math.inf, "since_sight_s": 3.5}, ACQUIRE),
         (FAR, {"fixes": 0, "since_fix_s": math.inf, "range_m": 2.0}, ABORT),
+        (FAR, {"fixes": 0, "since_fix_s": math.inf, "in_mode_s": 91.0}, ABORT),
         (MID, {"distance_m": 2.9}, NEAR),
         (MID, {"distance_m": 2.9, "off_axis_m": 0.4}, MID),
         (MID, {"distance_m": 2.9, "heading_error_rad": 0.3}, MID),
