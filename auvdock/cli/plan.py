@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
@@ -19,12 +19,16 @@ from auvdock.cli.parsing import parse
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import CameraCfg
+from auvdock.core.errors import ConfigError
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.strict import load_toml
+from auvdock.planning.array_design import ArrayBounds, physical_layout
 from auvdock.planning.detectability import Detectability
+from auvdock.planning.optimise import Found, OptimiseCfg, optimise_physical
 from auvdock.planning.pictures import Panel, draw_curves, draw_sections, section_grid
 from auvdock.planning.region import GuidanceSpace, PlanCfg, guidance_space, make_detectability
 from auvdock.planning.region_rerun import record_region
+from auvdock.planning.station_file import with_lights, write_station
 from auvdock.planning.sweeps import SweepPoint, sweep, variants
 
 __all__ = ["Plan", "run", "section_panels"]
@@ -50,10 +54,19 @@ class Plan:
     """Voxels along the longest side of the region."""
     width: int = 640
     """Image width in pixels, 16:9."""
+    optimise: Literal["volume", "volume_per_watt", "pose_error"] | None = None
+    """Place the array's lights anew for the greatest volume, the greatest volume per watt (power free up to the
+    station's) or the least pose error over the region, within --bounds; takes a minute or two."""
+    bounds: ArrayBounds = ArrayBounds(max_beam_deg=120.0)
+    """What the optimiser may choose from."""
+    generations: int = 14
+    """Generations of the optimiser's search."""
+    seed: int = 0
+    """Of the optimiser's draws."""
     sweep: bool = False
     """Sweep over beam angle, number of lights and tilt as well."""
     out: Path | None = None
-    """Folder for sections.png, region.rrd and sweeps.png."""
+    """Folder for sections.png, region.rrd, sweeps.png and optimised.toml."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -67,25 +80,39 @@ def run(argv: Sequence[str], prog: str) -> int:
     cfg = PlanCfg(args.water, args.attenuation, camera, min_lights=args.min_lights, resolution=args.resolution)
     sees = make_detectability(layout, cfg)
     cases = variants(station) if args.sweep else []
+    search = _search(args, station)
+    layouts = search.population * (search.generations + 1) if search is not None else 0
     columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     started = time.perf_counter()
     with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("region", total=1 + len(cases) + (3 if args.out else 0))
+        task = progress.add_task("region", total=1 + len(cases) + layouts + (3 if args.out else 0))
         space = guidance_space(layout, cfg, sees)
         region_s = time.perf_counter() - started
         progress.advance(task)
         files: list[str] = []
+        spaces = {"station": space}
+        optimised: dict[str, Any] | None = None
+        if search is not None:
+            rng = np.random.default_rng(args.seed)
+            found = optimise_physical(layout, search, cfg, rng, lambda: progress.advance(task))
+            best = physical_layout(found.design, layout, found.power_w / search.bounds.lights)
+            spaces["optimised"] = guidance_space(best, cfg)
+            optimised = _optimised(search, found, spaces["optimised"])
+            if args.out is not None:
+                write_station(args.out / "optimised.toml", with_lights(station, best))
+                files.append("optimised.toml")
         if args.out is not None:
             title = f"{args.station.stem} in {args.water}: {space.volume_m3:.0f} m³"
             panels = section_panels(sees, layout, space, lambda: progress.advance(task))
             draw_sections(args.out / "sections.png", title, panels, cfg.min_lights)
-            record_region(args.out / "region.rrd", layout, {args.water: space})
+            record_region(args.out / "region.rrd", layout, spaces)
             files += ["sections.png", "region.rrd"]
         points = sweep(cases, cfg, lambda: progress.advance(task)) if cases else []
         if args.out is not None and points:
             draw_curves(args.out / "sweeps.png", f"{args.station.stem} in {args.water}", _curves(points))
             files.append("sweeps.png")
     report = _report(args, space, region_s, points, files)
+    report["optimised"] = optimised
     if args.json:
         print(json.dumps(report, allow_nan=False))
     else:
@@ -125,6 +152,35 @@ def section_panels(
         if tick is not None:
             tick()
     return panels
+
+
+def _search(args: Plan, station: ConicalStationCfg) -> OptimiseCfg | None:
+    if args.optimise is None:
+        return None
+    if args.seed < 0:
+        raise ConfigError("seed", args.seed, "a whole number of 0 or more")
+    power = sum(beacon.power_w for beacon in station.layout.beacons if beacon.role == "array")
+    return OptimiseCfg(args.optimise, args.bounds, power, generations=args.generations)
+
+
+def _optimised(search: OptimiseCfg, found: Found, space: GuidanceSpace) -> dict[str, Any]:
+    design = found.design
+    rows = zip(design.azimuth_rad, design.radius_m, design.inward_tilt_deg, strict=True)
+    return {
+        "goal": search.goal,
+        "score": found.score,
+        "score_of_ring": found.start_score,
+        "layouts_tried": found.evaluations,
+        "volume_m3": space.volume_m3,
+        "discretisation_error_m3": space.error_m3,
+        "range_m": space.range_m,
+        "power_w": found.power_w,
+        "beam_deg": design.beam_deg,
+        "lights": [
+            {"azimuth_deg": float(np.degrees(azimuth)), "radius_m": float(radius), "inward_tilt_deg": float(tilt)}
+            for azimuth, radius, tilt in rows
+        ],
+    }
 
 
 def _curves(points: list[SweepPoint]) -> list[tuple[str, Array, Array]]:
@@ -179,6 +235,8 @@ def _print(report: dict[str, Any], points: list[SweepPoint]) -> None:
     for name, value in rows:
         table.add_row(name, value)
     console.print(table)
+    if report["optimised"] is not None:
+        _print_optimised(console, report)
     if points:
         table = Table(title="sweeps, the array's total power held", title_justify="left")
         for name in ("quantity", "value", "volume m³", "range m", "half angle °", "m³/W"):
@@ -195,3 +253,19 @@ def _print(report: dict[str, Any], points: list[SweepPoint]) -> None:
         console.print(table)
     for name in report["files"]:
         console.print(name, highlight=False)
+
+
+def _print_optimised(console: Console, report: dict[str, Any]) -> None:
+    found = report["optimised"]
+    table = Table(title=f"optimised for {found['goal'].replace('_', ' ')}", title_justify="left")
+    for name in ("light", "azimuth °, 0 is up", "radius m", "inward tilt °"):
+        table.add_column(name, justify="right")
+    for index, row in enumerate(found["lights"]):
+        table.add_row(
+            str(index), f"{row['azimuth_deg']:+.0f}", f"{row['radius_m']:.2f}", f"{row['inward_tilt_deg']:+.1f}"
+        )
+    console.print(table)
+    console.print(
+        f"beam {found['beam_deg']:.0f}°, {found['power_w']:.0f} W: {found['volume_m3']:.0f} ± "
+        f"{found['discretisation_error_m3']:.0f} m³; goal {found['score']:.4g}, the ring's {found['score_of_ring']:.4g}"
+    )
