@@ -5,6 +5,7 @@ The parameters are fitted on rendered frames (`optics.detection_fit`), one file 
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -16,7 +17,15 @@ from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
 
-__all__ = ["Candidates", "DetectionModelCfg", "draw_detections", "load_detection_model", "merge_close", "veiled_share"]
+__all__ = [
+    "Candidates",
+    "DetectionModelCfg",
+    "draw_detections",
+    "load_detection_model",
+    "merge_close",
+    "squared_distances",
+    "veiled_share",
+]
 
 _ONES = np.ones(2)
 _HAZE_PX = 20.0
@@ -84,6 +93,7 @@ class Candidates:
         radius_px: (m,) radius of the saturated disc, 0 without one.
         width_px: (m,) width of the spot.
         flux: (m,) weight of the light in a merged centre.
+        distance2_px2: (m, m) squared distances between them.
         red: (m,) whether red is its brightest channel: class `RED` (1), else `BLUE` (0).
     """
 
@@ -94,6 +104,7 @@ class Candidates:
     radius_px: Array
     width_px: Array
     flux: Array
+    distance2_px2: Array
     red: BoolArray
 
 
@@ -119,7 +130,8 @@ def draw_detections(
     """
     m = len(seen.flux)
     chance, noise = rng.random((2, m)), rng.standard_normal((m, 2))
-    alarms = rng.poisson(model.false_alarms * veiled_share(seen))
+    rate = model.false_alarms * veiled_share(seen)
+    alarms = rng.poisson(rate) if rate > 0.0 else 0
     merged = merge_close(seen, model)
     contrast = merged.contrast_dn
     odds = merged.surround_dn * model.surround_factor
@@ -157,6 +169,13 @@ def draw_detections(
     return Detections(xyxy, centre, score, class_id)
 
 
+def squared_distances(pixels: Array) -> Array:
+    """(m, m) squared distances between points (m, 2)."""
+    offset = pixels[:, None, :] - pixels
+    offset *= offset
+    return offset @ _ONES
+
+
 def veiled_share(seen: Candidates) -> float:
     """Share of lights whose surroundings outshine their contrast by 50 codes or more."""
     m = len(seen.flux)
@@ -171,12 +190,10 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
     m = len(seen.flux)
     if m < 2:
         return seen
-    offset = seen.pixels[:, None, :] - seen.pixels
-    offset *= offset
     reach = model.merge_radii * seen.radius_px
     limit = reach[:, None] + (reach + model.merge_px)
     limit *= limit
-    close = offset @ _ONES < limit
+    close = seen.distance2_px2 < limit
     if np.count_nonzero(close) == m:
         return seen
     pixels, contrast, flux = seen.pixels.copy(), seen.contrast_dn.copy(), seen.flux.copy()
@@ -202,7 +219,7 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
         for k in members:
             if k != first:
                 contrast[k] = 0.0
-    return Candidates(pixels, contrast, seen.surround_dn, seen.noise_dn, radius, seen.width_px, flux, seen.red)
+    return dataclasses.replace(seen, pixels=pixels, contrast_dn=contrast, radius_px=radius, flux=flux)
 
 
 def _root(lead: list[int], i: int) -> int:

@@ -17,6 +17,8 @@ from auvdock.sim.mj import MjModel, mujoco
 __all__ = ["StaticRenderer", "offscreen_context", "probe_gl"]
 
 _NEAR_M, _FAR_M = 0.05, 80.0
+_COARSE = {"offsamples": 0, "shadowsize": 0, "numslices": 12, "numstacks": 6, "numquads": 1}
+"""Quality while the context is made: no multisampling, no shadows, and few facets on what is round."""
 _REMEDY = (
     "install libegl1 and libgl1-mesa-dri and set MUJOCO_GL=egl, or install libosmesa6 and set MUJOCO_GL=osmesa; "
     "or run without images: --fidelity beacons"
@@ -98,11 +100,12 @@ class StaticRenderer:
         width, height = self._size
         model = self._model
         quality = model.vis.quality
-        kept = quality.offsamples, quality.shadowsize
+        kept = {name: getattr(quality, name) for name in _COARSE}
         try:
             self._gl = offscreen_context(width, height)
             self._gl.make_current()
-            quality.offsamples, quality.shadowsize = 0, 0
+            for name, value in _COARSE.items():
+                setattr(quality, name, value)
             self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
             mujoco.mjr_resizeOffscreen(width, height, self._context)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
@@ -113,7 +116,8 @@ class StaticRenderer:
             self._drop()
             raise GraphicsError(f"no OpenGL context for rendering ({error}); {_REMEDY}") from error
         finally:
-            quality.offsamples, quality.shadowsize = kept
+            for name, value in kept.items():
+                setattr(quality, name, value)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)

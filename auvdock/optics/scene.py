@@ -15,6 +15,7 @@ from auvdock.optics.bands import BANDS_NM, electrons_per_joule
 from auvdock.optics.lens import Lens
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_streams
 from auvdock.optics.radiometry import LightSet, Received
+from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.snow import Flakes, MarineSnow
 from auvdock.optics.spots import SpotModel
@@ -61,6 +62,7 @@ class LitScene:
         self.T_world_station = T_world_station
         self._T_station_world = invert(T_world_station)
         self.lens = Lens(camera, cfg)
+        self._scale = (1.0, SensorScale(cfg, 1.0))
         self.electrons_per_j = np.array([electrons_per_joule(nm) for nm in BANDS_NM]).T * self.lens.aperture_m2
         """(3, 3) electrons per second of each channel (row) for 1 W/(m² sr) over 1 sr in each band (column)."""
         self.snow = MarineSnow(nuisance.snow_level, self.lens, float(water.attenuation[0]))
@@ -99,6 +101,12 @@ class LitScene:
     def veil_e_s(self, depth_m: float) -> Array:
         """(3,) electrons per second of the veil in a pixel in the middle of the image: red, green, blue."""
         return self.electrons_per_j @ self.veil_w_m2_sr(depth_m) * self.lens.rad_per_px**2
+
+    def scale(self, gain: float) -> SensorScale:
+        """The sensor's scale at a gain; the last one is kept."""
+        if self._scale[0] != gain:
+            self._scale = (gain, SensorScale(self.cfg, gain))
+        return self._scale[1]
 
     def look(self, T_world_body: Array, time_s: float) -> View:
         """Light at the camera now; advances flicker and occlusions to `time_s`."""

@@ -15,19 +15,18 @@ from auvdock.optics.detection_model import (
     DetectionModelCfg,
     draw_detections,
     load_detection_model,
+    squared_distances,
 )
 from auvdock.optics.exposure import AutoExposure
 from auvdock.optics.metering import predicted_share, veil_share
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.scene import LitScene, View
-from auvdock.optics.sensor import SensorScale, sensor_scale
+from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.spots import Spots
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeaconSensor", "candidates_in_view"]
-
-_ONES = np.ones(2)
 
 
 class BeaconSensor:
@@ -100,15 +99,14 @@ def candidates_in_view(
         gain: analogue gain.
     """
     pixels = view.pixels[view.inside]
-    scale = sensor_scale(lit.cfg, gain)
+    scale = lit.scale(gain)
     model = lit.spots
     area = model.saturated_area_px2(spots, scale.saturated_e / exposure_s)
     share = model.share(area)
     channel = spots.channel * exposure_s
     best = channel.argmax(axis=1)
-    offset = pixels[:, None, :] - pixels
-    offset *= offset
-    level = model.at_distance(spots, offset @ _ONES)
+    gap2 = squared_distances(pixels)
+    level = model.at_distance(spots, gap2)
     level *= channel.T[best]
     around = level.sum(axis=1)
     own = level.diagonal().copy()
@@ -128,6 +126,7 @@ def candidates_in_view(
         np.sqrt(area.max(axis=1) * (1.0 / math.pi)),
         spots.sigma_px,
         own,
+        gap2,
         best == 0,
     )
     if view.flakes is None:
@@ -146,13 +145,15 @@ def _with_flakes(lit: LitScene, view: View, seen: Candidates, scale: SensorScale
     peak = flakes.irradiance_w_m2 * colour[best] / (2.0 * math.pi * sigma * sigma)
     contrast = np.minimum(scale.codes(peak), 255.0)
     shown = np.flatnonzero(contrast > 2.0)
+    pixels = np.concatenate([seen.pixels, flakes.pixels[shown]])
     return Candidates(
-        np.concatenate([seen.pixels, flakes.pixels[shown]]),
+        pixels,
         np.concatenate([seen.contrast_dn, contrast[shown]]),
         np.concatenate([seen.surround_dn, np.zeros(len(shown))]),
         np.concatenate([seen.noise_dn, scale.noise_dn(peak[shown])]),
         np.concatenate([seen.radius_px, np.zeros(len(shown))]),
         np.concatenate([seen.width_px, sigma[shown]]),
         np.concatenate([seen.flux, peak[shown]]),
+        squared_distances(pixels),
         np.concatenate([seen.red, np.full(len(shown), best == 0)]),
     )

@@ -13,7 +13,6 @@ rounded and clipped to 0…255. In both, the decoded electrons have a variance t
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array, Image
 from auvdock.optics.settings import ImagingCfg
 
-__all__ = ["SATURATED_CODE", "Sensor", "SensorScale", "saturated_share", "sensor_scale"]
+__all__ = ["SATURATED_CODE", "Sensor", "SensorScale", "saturated_share"]
 
 SATURATED_CODE = 250
 """Samples from this code upwards count as saturated in the exposure metering."""
@@ -65,12 +64,6 @@ class SensorScale:
         if self._linear:
             return np.sqrt((electrons + self._read2) * (255.0 / self.full_scale_e) ** 2 + 1.0 / 12.0)
         return np.full(electrons.shape, self._noise_dn)
-
-
-@lru_cache(maxsize=64)
-def sensor_scale(cfg: ImagingCfg, gain: float) -> SensorScale:
-    """The scale at one gain, kept."""
-    return SensorScale(cfg, gain)
 
 
 class Sensor:

@@ -25,17 +25,19 @@ __all__ = ["Surfaces"]
 
 _LAMP_M2 = 0.05**2
 """Least squared distance from a lamp to what it lights: its housing."""
+_GLARE_M2 = 0.15**2
+"""Closer to a lamp than this, its own core and halo outshine what it lights."""
 _GREATEST_RADIANCE = 1.0 / math.pi
 
 
 class Surfaces:
-    """Draws the static geoms of a model at half resolution, through water and lens."""
+    """Draws the static geoms of a model at a half or a third of the resolution, through water and lens."""
 
     def __init__(self, lit: LitScene, model: MjModel) -> None:
         """Precompute lens maps and what lamps do to each geom; no OpenGL yet."""
         self._lit = lit
         camera, lens = lit.camera, lit.lens
-        step = 2 if lens.factor % 2 == 0 else 1
+        step = next(step for step in (3, 2, 1) if lens.factor % step == 0)
         self.shape = (lens.shape[0] * lens.factor // step, lens.shape[1] * lens.factor // step)
         rows, columns = self.shape
         x, y = np.meshgrid((np.arange(columns) + 0.5) * step - 0.5, (np.arange(rows) + 0.5) * step - 0.5)
@@ -69,7 +71,7 @@ class Surfaces:
         self._lamp_absorption = lit.lights.absorption_per_m[:count]
         self._geoms = _Geoms(model)
         nearest = np.array([self._geoms.distance_m(lamp) for lamp in self._lamps]).T
-        loss = np.exp(-self._lamp_absorption * nearest) / (nearest**2 + _LAMP_M2)
+        loss = np.exp(-self._lamp_absorption * nearest) / np.maximum(nearest**2, _GLARE_M2)
         self._lamp_irradiance = loss @ self._spill_w_sr
 
     def close(self) -> None:
@@ -87,7 +89,7 @@ class Surfaces:
         return signal > math.sqrt(self._lit.cfg.read_noise_e**2 + veil)
 
     def electrons(self, T_world_camera: Array, exposure_s: float) -> NDArray[np.float32]:
-        """Electrons (h, w, 3) per image pixel, red, green, blue, at half resolution.
+        """Electrons (h, w, 3) per image pixel, red, green, blue, at this resolution.
 
         Raises:
             GraphicsError: no OpenGL context can be had.
@@ -98,7 +100,7 @@ class Surfaces:
         return np.asarray(cv2.multiply(image, self._solid_angle, image), dtype=np.float32)
 
     def radiance(self, T_world_camera: Array) -> NDArray[np.float32]:
-        """Radiance per band (h, w, 3) in W/(m² sr), blue, green, red, at half resolution.
+        """Radiance per band (h, w, 3) in W/(m² sr), blue, green, red, at this resolution.
 
         Raises:
             GraphicsError: no OpenGL context can be had.

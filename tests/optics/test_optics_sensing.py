@@ -16,6 +16,7 @@ from auvdock.optics.detection_model import (
     draw_detections,
     load_detection_model,
     merge_close,
+    squared_distances,
 )
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_preset
@@ -59,15 +60,17 @@ def sensor(layout=None, water=CLEAR, nuisance=None, model=None):
 
 def candidates(pixels, contrast, radius=0.0, around=0.0):
     m = len(pixels)
+    places = np.array(pixels, dtype=float).reshape(m, 2)
     ones = np.ones(m)
     return Candidates(
-        np.array(pixels, dtype=float).reshape(m, 2),
+        places,
         np.full(m, contrast, dtype=float),
         around * ones,
         0.7 * ones,
         radius * ones,
         ones,
         ones,
+        squared_distances(places),
         np.zeros(m, dtype=bool),
     )
 
