@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -158,8 +158,7 @@ class PoseEstimate:
         check_shape("covariance", self.covariance, (6, 6))
 
 
-@dataclass(frozen=True, eq=False)
-class TrackView:
+class TrackView(NamedTuple):
     """One track as others may see it: for recordings and for authentication's audit.
 
     Attributes:

@@ -258,7 +258,7 @@ def test_lost_tracks_look_different(setup: EpisodeSetup, episode: list[Tick], tm
     percept = episode[-40].percept
     assert percept is not None
     assert any(track.class_id == RED for track in percept.tracks)
-    lost = dataclasses.replace(percept, tracks=tuple(dataclasses.replace(track, missed=3) for track in percept.tracks))
+    lost = dataclasses.replace(percept, tracks=tuple(track._replace(missed=3) for track in percept.tracks))
     recording = record(
         tmp_path / "run.rrd",
         setup,
