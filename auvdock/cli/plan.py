@@ -25,7 +25,7 @@ from auvdock.core.strict import load_toml
 from auvdock.planning.array_design import ArrayBounds, physical_layout
 from auvdock.planning.detectability import Detectability
 from auvdock.planning.optimise import Found, OptimiseCfg, optimise_physical
-from auvdock.planning.pictures import Panel, draw_curves, draw_sections, section_grid
+from auvdock.planning.pictures import Panel, draw_curves, draw_sections, make_folder, section_grid
 from auvdock.planning.region import GuidanceSpace, PlanCfg, guidance_space, make_detectability
 from auvdock.planning.region_rerun import record_region
 from auvdock.planning.station_file import with_lights, write_station
@@ -79,6 +79,8 @@ def run(argv: Sequence[str], prog: str) -> int:
     camera = CameraCfg(width_px=args.width, height_px=round(args.width * 9 / 16))
     cfg = PlanCfg(args.water, args.attenuation, camera, min_lights=args.min_lights, resolution=args.resolution)
     sees = make_detectability(layout, cfg)
+    if args.out is not None:
+        make_folder(args.out)
     cases = variants(station) if args.sweep else []
     search = _search(args, station)
     layouts = search.population * (search.generations + 1) if search is not None else 0

@@ -26,6 +26,8 @@ from auvdock.experiments.guidance_space_design import (
     dock_campaign,
     draw_comparison,
 )
+from auvdock.optics.water import load_water
+from auvdock.planning.pictures import make_folder
 from auvdock.planning.station_file import write_station
 
 __all__ = ["GuidanceDesign", "run_guidance_design"]
@@ -62,6 +64,9 @@ def run_guidance_design(argv: Sequence[str], prog: str) -> int:
         raise ConfigError("seed", args.seed, "a whole number of 0 or more")
     if args.workers is not None and args.workers < 1:
         raise ConfigError("workers", args.workers, "1 or more")
+    load_water(args.water)
+    if args.out is not None:
+        make_folder(args.out)
     cfg = default_search()
     layouts = cfg.population * (cfg.generations + 1)
     columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))

@@ -23,6 +23,8 @@ from auvdock.experiments.guidance_space import (
     task_count,
 )
 from auvdock.experiments.guidance_space_check import check_grid, check_region, draw_agreement
+from auvdock.optics.water import load_water
+from auvdock.planning.pictures import make_folder
 
 __all__ = ["GuidanceRegion", "GuidanceSpace", "run_guidance_region", "run_guidance_space"]
 
@@ -136,6 +138,10 @@ def run_guidance_region(argv: Sequence[str], prog: str) -> int:
         raise ConfigError("steps", args.steps, "one grid step of 0.2 to 20 m for each water")
     if args.workers is not None and args.workers < 1:
         raise ConfigError("workers", args.workers, "1 or more")
+    for water in args.waters:
+        load_water(water)
+    if args.out is not None:
+        make_folder(args.out)
     columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     rows: list[dict[str, Any]] = []
     with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.core.errors import ConfigError
 
-__all__ = ["Panel", "draw_curves", "draw_sections", "save_figure", "section_grid"]
+__all__ = ["Panel", "draw_curves", "draw_sections", "make_folder", "save_figure", "section_grid"]
 
 _COLOURS = ("#f4f4f4", "#dfe7ee", "#c6d6e5", "#a9c3dc", "#5b9bd5", "#2e75b6", "#1f4e79", "#17375e", "#0f2540")
 
@@ -100,11 +100,23 @@ def draw_curves(path: Path, title: str, curves: list[tuple[str, Array, Array]]) 
     for index, (name, values, volumes) in enumerate(curves):
         axes: Axes = figure.add_subplot(1, len(curves), index + 1)
         axes.plot(values, volumes, "o-", color="#1f4e79")
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylim(0.0, 1.08 * max(float(volumes.max()), 1e-9))
         axes.set_xlabel(name)
         axes.set_ylabel("volume [m³]")
         axes.grid(alpha=0.3)
     save_figure(figure, path)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for results; ask before long work, so that it is not lost.
+
+    Raises:
+        ConfigError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError("out", str(folder), f"a folder that can be written to ({error.strerror})") from error
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -113,8 +125,8 @@ def save_figure(figure: Figure, path: Path) -> None:
     Raises:
         ConfigError: the file cannot be written.
     """
+    make_folder(path.parent)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         FigureCanvasAgg(figure).print_png(str(path))
     except OSError as error:
         raise ConfigError("out", str(path), f"a folder that can be written to ({error.strerror})") from error
