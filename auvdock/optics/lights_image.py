@@ -109,10 +109,24 @@ class LightsImage:
         colour = (self._channel[index] * exposure_s).astype(np.float32)
         reach = self._split_px
         core = received.core_w_m2[index]
+        narrow = sigma * 4.5 + 1.0 <= reach
+        across, down = self._core_profiles(offset, sigma)
+        down *= (core * narrow).astype(np.float32)[:, None]
+        patch += down[:, :, None] * across[:, None, :]
+        corner = centre.astype(np.int64) - reach
         for k in range(len(index)):
-            column, row = int(centre[k, 0]), int(centre[k, 1])
-            _add_patch(image, patch[k], column - reach, row - reach, colour[k])
-            add_spot(image, pixels[index[k]], float(sigma[k]), colour[k] * np.float32(core[k]))
+            _add_patch(image, patch[k], int(corner[k, 0]), int(corner[k, 1]), colour[k])
+            if not narrow[k]:
+                add_spot(image, pixels[index[k]], float(sigma[k]), colour[k] * np.float32(core[k]))
+
+    def _core_profiles(self, offset: Array, sigma: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Shares of Gaussian cores (m, patch) per column and per row; lights lie at -`offset` (m, 2) from the centre."""
+        edges = np.append(self._reach - 0.5, self._reach[-1] + 0.5)
+        scale = 1.0 / (sigma * _ROOT_2)
+        place = (edges + offset[:, :, None]) * scale[:, None, None]
+        shares = np.diff(erf(place), axis=2).astype(np.float32)
+        shares *= 0.5
+        return shares[:, 0], shares[:, 1]
 
     def _tables(self, received: Received, index: IntArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Per lamp the density on the shared index (m, entries) and the smooth inner part's A, B of A + B θ² (m, 2)."""
