@@ -49,6 +49,8 @@ class OptimiseCfg:
     """Directions, over a quarter sphere, at which the region is probed."""
     ranges: int = 18
     """Ranges at which it is probed in each direction."""
+    cone_deg: float = 90.0
+    """Only places within this angle of the approach axis count; 90 is all that lies before the mouth."""
     reach_m: float = 32.0
     """Greatest range that is probed."""
 
@@ -61,6 +63,8 @@ class OptimiseCfg:
         for name, least in (("generations", 1), ("population", 5), ("directions", 8), ("ranges", 4)):
             if getattr(self, name) < least:
                 raise ConfigError(f"optimise.{name}", getattr(self, name), f"{least} or more")
+        if not 5.0 <= self.cone_deg <= 90.0:
+            raise ConfigError("optimise.cone_deg", self.cone_deg, "5 to 90 degrees")
         if not self.reach_m > 1.0:
             raise ConfigError("optimise.reach_m", self.reach_m, "more than 1 m")
 
@@ -159,15 +163,16 @@ def physical_score(layout: BeaconLayout, cfg: OptimiseCfg, plan: PlanCfg, power_
 
 
 def _places(cfg: OptimiseCfg) -> tuple[Array, Array]:
-    """Places (m, 3) over the quarter sphere x > 0, y > 0 and the volume (m,) of both halves that each stands for."""
+    """Places (m, 3) in the half y > 0 of the cone and the volume (m,) of both halves that each stands for."""
     index = np.arange(cfg.directions) + 0.5
-    x = 1.0 - index / cfg.directions
+    cap = 1.0 - math.cos(math.radians(cfg.cone_deg))
+    x = 1.0 - cap * index / cfg.directions
     phi = np.mod(index * (3.0 - math.sqrt(5.0)), 1.0) * math.pi - 0.5 * math.pi
     side = np.sqrt(1.0 - x**2)
     rays = np.column_stack([x, side * np.cos(phi), side * np.sin(phi)])
     edges = np.linspace(0.0, cfg.reach_m, cfg.ranges + 1)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    shell = (edges[1:] ** 3 - edges[:-1] ** 3) * 2.0 * math.pi / 3.0 / cfg.directions
+    shell = (edges[1:] ** 3 - edges[:-1] ** 3) * 2.0 * math.pi * cap / 3.0 / cfg.directions
     return (rays[None] * middle[:, None, None]).reshape(-1, 3), np.repeat(shell, cfg.directions)
 
 
