@@ -120,7 +120,7 @@ class LightsImage:
                 add_spot(image, pixels[index[k]], float(sigma[k]), colour[k] * np.float32(core[k]))
 
     def _core_profiles(self, offset: Array, sigma: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Shares of Gaussian cores (m, patch) per column and per row; lights lie at -`offset` (m, 2) from the centre."""
+        """Shares of Gaussian cores (m, patch) per column and per row, lights at -`offset` (m, 2) from the centre."""
         edges = np.append(self._reach - 0.5, self._reach[-1] + 0.5)
         scale = 1.0 / (sigma * _ROOT_2)
         place = (edges + offset[:, :, None]) * scale[:, None, None]

@@ -117,14 +117,12 @@ class Surfaces:
         light = self._lamp_light(T_world_camera, distance)
         light += daylight.astype(np.float32)
         light = cv2.resize(light, (self.shape[1], self.shape[0]), interpolation=cv2.INTER_LINEAR)
-        albedo = cv2.cvtColor(colour, cv2.COLOR_RGB2BGR)
-        scene = cv2.multiply(albedo, light, scale=1.0 / (255.0 * math.pi), dtype=cv2.CV_32F)
-        path = np.repeat(distance[:, :, None], 3, axis=2)
-        through = cv2.exp(path * (-self._beta_direct).astype(np.float32))
-        image = np.asarray(cv2.multiply(scene, through), dtype=np.float32)
+        albedo = cv2.cvtColor(colour, cv2.COLOR_RGB2BGR).astype(np.float32)
+        scene = cv2.multiply(albedo, light, albedo, scale=1.0 / (255.0 * math.pi))
+        image = np.asarray(cv2.multiply(scene, _exponential(distance, -self._beta_direct), scene), dtype=np.float32)
         if veil.max() > 0.0:
-            lost = cv2.exp(path * (-self._beta_veil).astype(np.float32))
-            image += (1.0 - lost) * veil.astype(np.float32)
+            lost = _exponential(distance, -self._beta_veil)
+            image += cv2.transform(lost, np.column_stack([np.diag(-veil), veil]).astype(np.float32))
         return image
 
     def _lamp_light(self, T_world_camera: Array, distance: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -140,6 +138,12 @@ class Surfaces:
         weight = cv2.exp(cv2.sqrt(d2) * (-self._lamp_absorption).astype(np.float32))
         weight /= d2
         return (weight @ self._spill_w_sr.astype(np.float32)).reshape(rows, columns, 3)
+
+
+def _exponential(distance: NDArray[np.float32], per_m: Array) -> NDArray[np.float32]:
+    """(h, w, 3) e^{k z} for a distance image (h, w) and three coefficients in 1/m."""
+    planes = [cv2.exp(distance * np.float32(k)) for k in per_m]
+    return np.asarray(cv2.merge(planes), dtype=np.float32)
 
 
 class _Geoms:
