@@ -65,7 +65,9 @@ class RayExecutor:
             )
         except (ConnectionError, RuntimeError, ValueError) as error:
             short = str(error).strip().splitlines()[0]
-            raise ConfigError("address", address, f"the address of a running Ray cluster ({short})") from error
+            raise ConfigError(
+                "address", address, f"the address of a running Ray cluster, with RAY_AUTH_MODE as it has it ({short})"
+            ) from error
         self._count = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
         self._make: Any = None
         self._actors: list[_Actor] = []
