@@ -81,5 +81,5 @@ def _usage(words: Sequence[str]) -> int:
         return 2
     print("usage: auvdock COMMAND [--help] ...\n", file=out)
     for command, (_, summary) in COMMANDS.items():
-        print(f"  {' '.join(command):14s} {summary}", file=out)
+        print(f"  {' '.join(command):26s} {summary}", file=out)
     return 0 if asked else 2
