@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -59,6 +59,8 @@ class Plan:
     station's) or the least pose error over the region, within --bounds; takes a minute or two."""
     bounds: ArrayBounds = ArrayBounds(max_beam_deg=120.0)
     """What the optimiser may choose from."""
+    cone: float = 90.0
+    """The optimiser counts only places within this angle of the approach axis, in degrees."""
     generations: int = 14
     """Generations of the optimiser's search."""
     seed: int = 0
@@ -105,7 +107,7 @@ def run(argv: Sequence[str], prog: str) -> int:
                 files.append("optimised.toml")
         if args.out is not None:
             title = f"{args.station.stem} in {args.water}: {space.volume_m3:.0f} m³"
-            panels = section_panels(sees, layout, space, lambda: progress.advance(task))
+            panels = section_panels(sees, layout, space, lambda: progress.advance(task), min(64, args.resolution + 8))
             draw_sections(args.out / "sections.png", title, panels, cfg.min_lights)
             record_region(args.out / "region.rrd", layout, spaces)
             files += ["sections.png", "region.rrd"]
@@ -126,9 +128,18 @@ def section_panels(
     sees: Detectability,
     layout: BeaconLayout,
     space: GuidanceSpace,
-    tick: Any = None,  # noqa: ANN401
+    tick: Callable[[], object],
+    places: int = 64,
 ) -> list[Panel]:
-    """Sections: level through the axis, upright through it, and across it at half of the range."""
+    """Sections: level through the axis, upright through it, and across it at half of the range.
+
+    Args:
+        sees: camera, water and lights.
+        layout: the lights.
+        space: the region, for the sections' extent.
+        tick: called after each section.
+        places: places along each side of a section.
+    """
     lights = layout.array_positions_m
 
     def count(points_m: Array) -> IntArray:
@@ -148,11 +159,10 @@ def section_panels(
     )
     panels: list[Panel] = []
     for title, axes, fixed in cuts:
-        one, other = (np.linspace(low[k] + 0.02, high[k], 64) for k in axes)
+        one, other = (np.linspace(low[k] + 0.02, high[k], places) for k in axes)
         grid = section_grid(count, axes, one, other, fixed)
         panels.append(Panel(title, "xyz"[axes[0]], "xyz"[axes[1]], one, other, grid, lights[:, axes]))
-        if tick is not None:
-            tick()
+        tick()
     return panels
 
 
@@ -162,7 +172,7 @@ def _search(args: Plan, station: ConicalStationCfg) -> OptimiseCfg | None:
     if args.seed < 0:
         raise ConfigError("seed", args.seed, "a whole number of 0 or more")
     power = sum(beacon.power_w for beacon in station.layout.beacons if beacon.role == "array")
-    return OptimiseCfg(args.optimise, args.bounds, power, generations=args.generations)
+    return OptimiseCfg(args.optimise, args.bounds, power, generations=args.generations, cone_deg=args.cone)
 
 
 def _optimised(search: OptimiseCfg, found: Found, space: GuidanceSpace) -> dict[str, Any]:

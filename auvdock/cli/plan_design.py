@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -45,6 +46,8 @@ class GuidanceDesign:
     """Water preset of the physical model."""
     episodes: int = 24
     """Docking episodes with each array; 0 leaves them out."""
+    cone: float = 90.0
+    """In the physical model, count only places within this angle of the approach axis, in degrees."""
     seed: int = 0
     """Of the search."""
     out: Path | None = None
@@ -68,6 +71,7 @@ def run_guidance_design(argv: Sequence[str], prog: str) -> int:
     if args.out is not None:
         make_folder(args.out)
     cfg = default_search()
+    search = dataclasses.replace(cfg, cone_deg=args.cone)
     layouts = cfg.population * (cfg.generations + 1)
     columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     campaigns: list[Campaign] = []
@@ -75,7 +79,7 @@ def run_guidance_design(argv: Sequence[str], prog: str) -> int:
         task = progress.add_task("layouts in paper A's model", total=layouts)
         paper = compare_paper(cfg, args.seed, lambda: progress.advance(task))
         second = progress.add_task(f"layouts in {args.water}", total=layouts)
-        physical = compare_physical(args.water, cfg, args.seed, lambda: progress.advance(second))
+        physical = compare_physical(args.water, search, args.seed, lambda: progress.advance(second))
         if args.episodes:
             stations = {"paper's ring": load_conical_station(), "optimised": physical.station}
             third = progress.add_task("docking campaigns", total=2)
@@ -87,17 +91,17 @@ def run_guidance_design(argv: Sequence[str], prog: str) -> int:
         draw_comparison(args.out / "guidance_design.png", physical, paper)
         write_station(args.out / f"optimised_{args.water}.toml", physical.station)
         files = [str(args.out / name) for name in ("guidance_design.png", f"optimised_{args.water}.toml")]
-    report = _report(paper, physical, campaigns, files)
+    report = _report(paper, physical, campaigns, files, args.cone)
     if args.json:
         print(json.dumps(report, allow_nan=False))
     else:
         _print(report)
-    better = paper.best_m3 > paper.ring_m3 and physical.best.volume_m3 > physical.ring.volume_m3
+    better = paper.best_m3 > paper.ring_m3 and physical.found.score > physical.found.start_score
     return 0 if better else 1
 
 
 def _report(
-    paper: PaperComparison, physical: PhysicalComparison, campaigns: list[Campaign], files: list[str]
+    paper: PaperComparison, physical: PhysicalComparison, campaigns: list[Campaign], files: list[str], cone_deg: float
 ) -> dict[str, Any]:
     return {
         "paper_a_model": {
@@ -119,6 +123,9 @@ def _report(
             "gain": physical.best.volume_m3 / physical.ring.volume_m3 - 1.0,
             "ring_range_m": physical.ring.range_m,
             "optimised_range_m": physical.best.range_m,
+            "cone_deg": cone_deg,
+            "ring_in_cone_m3": physical.found.start_score,
+            "optimised_in_cone_m3": physical.found.score,
             "power_w": physical.found.power_w,
             "beam_deg": physical.found.design.beam_deg,
             "lights": design_rows(physical.found.design),
