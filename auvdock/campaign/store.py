@@ -7,6 +7,7 @@ death between the two leaves rows in both, which reading takes once.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -283,5 +284,8 @@ def _readable(folder: Path) -> Generator[None]:
         yield
     except OSError as error:
         why = error.strerror or str(error)
-        remedy = "finished episodes are kept; make room, then go on with --resume"
-        raise CampaignError(f"{folder}: cannot be written ({why}); {remedy}") from error
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        remedy = "make room" if full else "make it writable or give another --out"
+        raise CampaignError(
+            f"{folder}: cannot be written ({why}); {remedy}; --resume goes on, finished episodes are kept"
+        ) from error
