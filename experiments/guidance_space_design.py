@@ -39,7 +39,8 @@ __all__ = [
 ]
 
 LEVEL = 1
-START = {"min_range_m": 10.0, "max_range_m": 25.0, "lateral_m": 12.0, "vertical_m": 3.0, "heading_deg": 60.0}
+START = {"min_range_m": 22.0, "max_range_m": 30.0, "lateral_m": 6.0, "vertical_m": 3.0, "heading_deg": 30.0}
+"""Starts outside the region of either array in the pool, so that each array decides where precise guidance begins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +148,7 @@ def dock_campaign(
 ) -> Campaign:
     """Episodes of level 1 in the `beacons` fidelity, seeds 0, 1, ..., the same for every array.
 
-    Starts are spread wider than the level's (`START`), for a guidance space is more than its axis.
+    Starts are `START`'s, not the level's.
     """
     results: list[EpisodeResult] = []
     workers = workers or os.cpu_count() or 1

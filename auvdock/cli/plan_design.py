@@ -46,8 +46,9 @@ class GuidanceDesign:
     """Water preset of the physical model."""
     episodes: int = 24
     """Docking episodes with each array; 0 leaves them out."""
-    cone: float = 90.0
-    """In the physical model, count only places within this angle of the approach axis, in degrees."""
+    cone: float = 25.0
+    """In the physical model, count only places within this angle of the approach axis, in degrees; 90 is the whole
+    half space."""
     seed: int = 0
     """Of the search."""
     out: Path | None = None
