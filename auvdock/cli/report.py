@@ -83,7 +83,6 @@ def _record(campaign: Campaign, count: int) -> None:
     plan = Plan(campaign.cfg)
     for number in wanted:
         path = recording_path(campaign.folder, number)
-        path.parent.mkdir(exist_ok=True)
         spec = plan[number]
         EpisodeRunner(plan.config(spec)).run(spec.seed, [RerunRecorder(path)])
 

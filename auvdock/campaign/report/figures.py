@@ -10,6 +10,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from auvdock.campaign.report.cells import Campaign, Map, by_axis, rate_of
 from auvdock.campaign.row import Row
@@ -163,6 +164,7 @@ def distribution_figure(rows: Sequence[Row]) -> str:
             axes.axvline(middle, color=INK, linewidth=1.2)
             axes.set_title(f"median {middle:.3g}, 5–95 %: {low:.3g} to {high:.3g}", fontsize=9, color=MUTED, loc="left")
         axes.set_xlabel(label)
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_ylabel("episodes" if number % 3 == 0 else "")
         _tidy(axes)
     legend = figure.add_subplot(2, 3, 6)

@@ -43,7 +43,7 @@ a { color: var(--accent); } @media print { .scroll { max-height: none; } }
 
 def recording_path(folder: Path, episode: int) -> Path:
     """Where the recording of an episode lies, if there is one."""
-    return folder / "recordings" / f"episode-{episode:06d}.rrd"
+    return folder / f"episode-{episode:06d}.rrd"
 
 
 def html_page(campaign: Campaign, comparison: Comparison | None) -> str:
@@ -92,7 +92,7 @@ def _axis_words(campaign: Campaign) -> list[str]:
         if axis.values:
             words.append(f"{axis.name} {', '.join(map(str, axis.values))}")
         elif axis.is_grid:
-            words.append(f"{axis.name} {axis.low:g} to {axis.high:g} in {axis.count} steps")
+            words.append(f"{axis.name} {axis.low:g} to {axis.high:g} ({axis.count} values)")
         else:
             words.append(f"{axis.name} {axis.low:g} to {axis.high:g}, {axis.distribution} ({campaign.cfg.sampling})")
     return words
