@@ -85,7 +85,7 @@ def test_one_isotropic_lamp_in_water_that_does_not_scatter_gives_the_sphere(abso
     def excess(r):
         return intensity * math.exp(-absorption * r) / r**2 * per_irradiance - electrons
 
-    radius = brentq(excess, 0.01, 500.0)
+    radius = float(np.asarray(brentq(excess, 0.01, 500.0)))
     box = 1.1 * radius * np.ones(3)
     region = fill_region(lambda points: sees.seen(points, 1), -box, box, radius / 20.0)
     assert region.volume_m3 == pytest.approx(4.0 / 3.0 * math.pi * radius**3, rel=0.01)
