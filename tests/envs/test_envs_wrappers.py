@@ -18,6 +18,7 @@ def fly(env, action, seconds):
     return env.unwrapped.world.truth
 
 
+@pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")  # it is: that is what is checked here
 @pytest.mark.parametrize("wrapper", [BodyWrenchAction, SetPointAction])
 def test_environment_checker_is_content(wrapper):
     check_env(wrapper(DockingEnv(STRAIGHT)), skip_render_check=True)
