@@ -72,6 +72,7 @@ class PhysicalComparison:
         station: the station with the optimised array.
         ring: guidance space of the paper's ring.
         best: guidance space of the optimised array.
+        cone_deg: angle about the approach axis within which the search counted places.
     """
 
     water: str
@@ -79,6 +80,7 @@ class PhysicalComparison:
     station: ConicalStationCfg
     ring: GuidanceSpace
     best: GuidanceSpace
+    cone_deg: float
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,7 @@ def compare_physical(
         with_lights(station, best),
         guidance_space(station.layout, plan),
         guidance_space(best, plan),
+        cfg.cone_deg,
     )
 
 
@@ -211,12 +214,15 @@ def draw_comparison(path: Path, comparison: PhysicalComparison, paper: PaperComp
         axes.set_ylabel(f"{'xyz'[axes_pair[1]]} [m]")
         axes.set_title(f"four lights found, {name} section, {comparison.water}", fontsize=10)
         axes.legend(fontsize=8)
-    gain = 100.0 * (comparison.best.volume_m3 / comparison.ring.volume_m3 - 1.0)
-    gain_paper = 100.0 * (paper.best_m3 / paper.ring_m3 - 1.0)
+    found = comparison.found
+    gain, gain_paper = found.score / found.start_score - 1.0, paper.best_m3 / paper.ring_m3 - 1.0
     title = (
-        f"{comparison.ring.volume_m3:.0f} → {comparison.best.volume_m3:.0f} m³ ({gain:+.0f} %) in {comparison.water}; "
+        f"{found.start_score:.0f} → {found.score:.0f} m³ ({gain:+.0%}) within {comparison.cone_deg:.0f}° of the axis "
     )
-    title += f"{paper.ring_m3:.1f} → {paper.best_m3:.1f} m³ ({gain_paper:+.1f} %) in paper A's model; equal power"
+    title += (
+        f"in {comparison.water}; {paper.ring_m3:.1f} → {paper.best_m3:.1f} m³ ({gain_paper:+.1%}) in paper A's model; "
+    )
+    title += "equal power"
     figure.suptitle(title)
     save_figure(figure, path)
 

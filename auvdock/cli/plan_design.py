@@ -142,11 +142,15 @@ def _print(report: dict[str, Any]) -> None:
     table = Table(title="six lights, equal power", title_justify="left")
     for name in ("model", "paper's ring m³", "optimised m³", "gain", "beam °"):
         table.add_column(name, justify="left" if name == "model" else "right")
-    for key, name in (("paper_a_model", "paper A's"), ("physical_model", "physical")):
-        row = report[key]
-        table.add_row(
-            name, f"{row['ring_m3']:.1f}", f"{row['optimised_m3']:.1f}", f"{row['gain']:+.1%}", f"{row['beam_deg']:.0f}"
-        )
+    paper, physical = report["paper_a_model"], report["physical_model"]
+    inner, outer = physical["ring_in_cone_m3"], physical["optimised_in_cone_m3"]
+    rows = (
+        ("paper A's", paper["ring_m3"], paper["optimised_m3"], paper["beam_deg"]),
+        (f"physical, within {physical['cone_deg']:g}°", inner, outer, physical["beam_deg"]),
+        ("physical, all", physical["ring_m3"], physical["optimised_m3"], physical["beam_deg"]),
+    )
+    for name, ring, best, beam in rows:
+        table.add_row(name, f"{ring:.1f}", f"{best:.1f}", f"{best / ring - 1.0:+.1%}", f"{beam:.0f}")
     console.print(table)
     if report["campaigns"]:
         table = Table(title="docking campaigns, beacons fidelity", title_justify="left")
