@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,37 +47,38 @@ class GuidanceMetrics:
         self._array_station = np.hstack([points, np.ones((len(points), 1))])
         self._precise = 0
         self._invalid = 0
-        self._entry_m: float | None = None
-        self._last_m: float | None = None
-        self._errors_m: list[float] = []
+        self._camera_body = camera.T_body_camera[:, 3]
+        self._true_m: list[Array] = []
+        self._measured_m: list[Array] = []
 
     def add(self, truth: Truth, percept: Percept) -> None:
         """Count one frame."""
         measured = percept.pose is not None and percept.pose.measured
-        if self._entry_m is None and not measured:
+        if not self._true_m and not measured:
             return
-        T_station_camera = self._T_station_world @ truth.T_world_body @ self._camera.T_body_camera
         if measured and percept.pose is not None:
-            distance_m = float(T_station_camera[0, 3])
-            self._entry_m = distance_m if self._entry_m is None else self._entry_m
-            self._last_m = distance_m
-            error = percept.pose.T_station_camera[:3, 3] - T_station_camera[:3, 3]
-            self._errors_m.append(math.sqrt(float(error @ error)))
+            # Kept as they are and compared in one go at the end: this runs in every frame.
+            self._true_m.append(truth.T_world_body @ self._camera_body)
+            self._measured_m.append(percept.pose.T_station_camera[:3, 3])
             self._precise += 1
-        elif self._array_in_view(T_station_camera):
+        elif self._array_in_view(self._T_station_world @ truth.T_world_body @ self._camera.T_body_camera):
             self._precise += 1
             self._invalid += 1
 
     def summary(self) -> GuidanceSummary:
         """The metrics so far."""
-        entered = self._entry_m is not None and self._last_m is not None
+        entry_m = last_m = error_m = None
+        if self._true_m:
+            camera_m = np.array(self._true_m) @ self._T_station_world[:3].T
+            entry_m, last_m = float(camera_m[0, 0]), float(camera_m[-1, 0])
+            error_m = float(np.median(np.linalg.norm(np.array(self._measured_m) - camera_m, axis=1)))
         return GuidanceSummary(
             distortion_rate=self._invalid / self._precise if self._precise else None,
             precise_frames=self._precise,
             invalid_frames=self._invalid,
-            entry_distance_m=self._entry_m,
-            precise_range_m=(self._entry_m or 0.0) - (self._last_m or 0.0) if entered else None,
-            pose_error_median_m=float(np.median(self._errors_m)) if self._errors_m else None,
+            entry_distance_m=entry_m,
+            precise_range_m=None if entry_m is None or last_m is None else entry_m - last_m,
+            pose_error_median_m=error_m,
         )
 
     def _array_in_view(self, T_station_camera: Array) -> bool:

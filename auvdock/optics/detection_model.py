@@ -5,9 +5,9 @@ The parameters are fitted on rendered frames (`optics.detection_fit`), one file 
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,8 +81,7 @@ class DetectionModelCfg:
                 raise ConfigError(f"detection.{name}", getattr(self, name), "a probability of 0 to 1")
 
 
-@dataclass(frozen=True, eq=False)
-class Candidates:
+class Candidates(NamedTuple):
     """Lights on the sensor as a detector meets them.
 
     Attributes:
@@ -219,7 +218,7 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
         for k in members:
             if k != first:
                 contrast[k] = 0.0
-    return dataclasses.replace(seen, pixels=pixels, contrast_dn=contrast, radius_px=radius, flux=flux)
+    return seen._replace(pixels=pixels, contrast_dn=contrast, radius_px=radius, flux=flux)
 
 
 def _root(lead: list[int], i: int) -> int:

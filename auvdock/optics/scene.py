@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,7 @@ __all__ = ["LitScene", "View"]
 _WATER_INDEX = 1.34
 
 
-@dataclass(frozen=True, eq=False)
-class View:
+class View(NamedTuple):
     """What the lamps send into the camera in one frame.
 
     Attributes:

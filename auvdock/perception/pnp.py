@@ -257,9 +257,21 @@ class PnpSolver:
         )
 
     def _prior_terms(self, prior: Array) -> tuple[Array, Array]:
+        """Rotation vector r of the prior and w J_lᵀ J_l = w [A I + (1 − A) r̂ r̂ᵀ], A = 2 (1 − cos |r|) / |r|²."""
         vector = _rodrigues(prior).ravel()
-        left = _left_jacobian(vector)
-        return vector, self._prior_weight * (left.T @ left)
+        x, y, z = vector.tolist()
+        square = x * x + y * y + z * z
+        if square < 1e-16:
+            return vector, self._prior_weight * np.eye(3)
+        across = self._prior_weight * 2.0 * (1.0 - math.cos(math.sqrt(square))) / square
+        along = (self._prior_weight - across) / square
+        xy, xz, yz = along * x * y, along * x * z, along * y * z
+        matrix = [
+            [across + along * x * x, xy, xz],
+            [xy, across + along * y * y, yz],
+            [xz, yz, across + along * z * z],
+        ]
+        return vector, np.array(matrix)
 
 
 def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Array | None:

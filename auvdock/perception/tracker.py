@@ -155,6 +155,10 @@ class LightTracker:
         spread = self.covariance[:, :1] + variance[None, :]
         distance = np.einsum("ijk,ijk->ij", gap, gap) / spread
         allowed = (distance <= self._gate) & (self.class_id[:, None] == detections.class_id[None, :])
+        count = np.count_nonzero(allowed)
+        rows, columns = allowed.nonzero()
+        if len(set(columns.tolist())) == count == len(set(rows.tolist())):
+            return rows, columns  # nobody competes: the Hungarian method would find the same
         # A stale track has a wide gate: the log term keeps it from taking the detection of a sharp one.
         cost = np.where(allowed, distance + 2.0 * np.log(spread / variance[None, :]), _UNMATCHED_COST)
         rows, columns = linear_sum_assignment(cost)
