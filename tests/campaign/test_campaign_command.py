@@ -89,7 +89,6 @@ def test_killed_and_resumed_the_table_is_that_of_an_undisturbed_run(tmp_path):
         (["--seed", "-1"], "seed", "0 or more"),
         (["--until-ci", "0.7"], "until_ci", "0.5"),
         (["--campaign", "no-such-file.toml"], "file", "readable"),
-        (["--executor", "ray", "--address", "nonsense://x"], "address", "cluster"),
         (["--detector", "oracle"], "detector", "threshold"),
     ],
 )
@@ -104,6 +103,25 @@ def test_input_that_cannot_be_used_is_named_in_one_line(tmp_path, capsys, words,
     assert len(printed.err.splitlines()) == 1
     assert field in printed.err
     assert remedy in printed.err
+
+
+def refusal_of_ray(tmp_path, capsys):
+    flags = ["--out", str(tmp_path / "out"), "--executor", "ray", "--address", "nonsense://x", "--json"]
+    assert main(["sweep", *FLAGS, "--episodes", "1", *flags]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_ray_address_that_leads_nowhere_is_named(tmp_path, capsys):
+    pytest.importorskip("ray")
+    assert "address" in (line := refusal_of_ray(tmp_path, capsys))
+    assert "cluster" in line
+
+
+def test_without_ray_the_extra_is_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    assert "auvdock[ray]" in refusal_of_ray(tmp_path, capsys)
 
 
 def test_where_the_output_is_no_terminal_lines_are_plain(tmp_path, capsys):
