@@ -1,1 +1,1 @@
-"""auvdock.controllers."""
+"""Pose to command: modes, guidance, autopilot, thrust allocation."""

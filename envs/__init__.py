@@ -1,1 +1,1 @@
-"""auvdock.envs."""
+"""The docking world and the Gymnasium environment around it."""

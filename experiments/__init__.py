@@ -1,1 +1,1 @@
-"""auvdock.experiments."""
+"""One file for each published table, comparison or picture."""

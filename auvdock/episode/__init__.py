@@ -1,1 +1,1 @@
-"""auvdock.episode."""
+"""One world and one pilot: the episode, its metrics and its result."""

@@ -53,7 +53,7 @@ class EpisodeResult:
     time_s: float
     path_length_m: float
     energy_j: float
-    """Work done by thrusters and fins' lag on the water's side: ∫ Σ |thrust × advance or swept power| dt, see `sim`."""
+    """Hydraulic work of the thrusters by actuator-disc theory (`auvdock.sim.actuation.Actuators.power_w`)."""
     peak_contact_force_n: float
     lateral_error_m: float | None
     """Sideways distance of the nose from the tube's axis as it crosses the throat; positive is +y of the station."""

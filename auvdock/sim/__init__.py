@@ -1,1 +1,1 @@
-"""auvdock.sim."""
+"""Truth: vehicle, hydrodynamics, ocean, station and their MuJoCo scene."""
