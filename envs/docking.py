@@ -56,8 +56,8 @@ less 50 on collision or divergence.
 Uniform within `WorldCfg.start`: 15 to 30 m in front of the mouth, ±3 m sideways, ±1.5 m in depth, ±30° of heading.
 
 ## Episode end
-Terminated by success, a collision harder than `WorldCfg.limits.collision_force_n`, or divergence. Truncated after
-`WorldCfg.limits.max_time_s`. `info` always has `is_success` (bool) and `failure_reason` (str or None).
+Terminated by success, a collision harder than `WorldCfg.limits.collision_force_n`, divergence, or a latch that closed
+on an entry outside its limits (`terminal`). Truncated after `WorldCfg.limits.max_time_s`. `info` always has `is_success` (bool) and `failure_reason` (str or None).
 
 ## Arguments
 `cfg` (`WorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`
@@ -181,8 +181,8 @@ class DockingEnv(gymnasium.Env[Any, Any]):
         truth = self._world.truth
         end = self._world.end
         success = self._world.is_success
-        terminated = success or end in ("diverged", "collision")
-        truncated = not terminated and end == "timeout"
+        truncated = not success and end == "timeout"
+        terminated = success or (end is not None and not truncated)
         return self._observe(truth), self._reward(truth, success, end), terminated, truncated, self._info(truth)
 
     def render(self) -> Any:  # noqa: ANN401

@@ -91,6 +91,7 @@ class DockingWorld:
         self._steps_per_frame = round(cfg.sim.physics_hz / cfg.camera.rate_hz)
         self._step_count = 0
         self._last_frame_step = -1
+        self._latched_at_s: float | None = None
         self._truth: Truth | None = None
 
     def reset(self, seed: int) -> None:
@@ -105,6 +106,7 @@ class DockingWorld:
         (self._beacon_sensor or self.imager).reset(camera)
         self._step_count = 0
         self._last_frame_step = -self._steps_per_frame
+        self._latched_at_s = None
         self._truth = None
 
     def step(self, values: Array) -> None:
@@ -113,6 +115,8 @@ class DockingWorld:
             self.simulator.step(values)
         self._step_count += self._steps_per_control
         self._truth = None
+        if self._latched_at_s is None and self.truth.latched:
+            self._latched_at_s = self.truth.time_s
 
     def sense(self) -> Sensed:
         """Sample the sensors now; once per control period."""
@@ -140,6 +144,10 @@ class DockingWorld:
             return "diverged"
         if truth.peak_contact_force_n > self.cfg.limits.collision_force_n:
             return "collision"
+        if self._latched_at_s is not None and not truth.docked:
+            held_s = truth.time_s - self._latched_at_s
+            if held_s > self.cfg.station.latch.hold_s + 1.0 / self.cfg.control_hz:
+                return "terminal"  # held, but entered too fast or too far askew: that will not change any more
         if truth.time_s >= self.cfg.limits.max_time_s - 1e-9:
             return "timeout"
         return None

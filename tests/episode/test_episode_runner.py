@@ -94,6 +94,16 @@ def test_a_hard_contact_ends_as_collision():
     assert reasons <= {"collision", None}
 
 
+def test_a_latch_that_closed_on_a_forbidden_entry_ends_the_episode_as_terminal():
+    latch = {"max_entry_speed_m_s": 0.05}  # slower than any vehicle can enter
+    result = EpisodeRunner(beacons(station={"latch": latch})).run(0)
+    assert not result.success
+    assert result.failure_reason == "terminal"
+    assert result.entry_speed_m_s is not None
+    assert result.entry_speed_m_s > 0.05
+    assert result.time_s < 100.0
+
+
 def test_diverging_state_ends_as_diverged():
     runner = EpisodeRunner(beacons())
     original = runner.world.step
