@@ -57,7 +57,8 @@ Uniform within `WorldCfg.start`: 15 to 30 m in front of the mouth, ±3 m sideway
 
 ## Episode end
 Terminated by success, a collision harder than `WorldCfg.limits.collision_force_n`, divergence, or a latch that closed
-on an entry outside its limits (`terminal`). Truncated after `WorldCfg.limits.max_time_s`. `info` always has `is_success` (bool) and `failure_reason` (str or None).
+on an entry outside its limits (`terminal`). Truncated after `WorldCfg.limits.max_time_s`. `info` always has
+`is_success` (bool) and `failure_reason` (str or None).
 
 ## Arguments
 `cfg` (`WorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`
