@@ -14,6 +14,7 @@ from auvdock.core.camera import Camera
 __all__ = [
     "BLUE",
     "RED",
+    "AzimuthFix",
     "Bearing",
     "Command",
     "Detections",
@@ -23,6 +24,7 @@ __all__ = [
     "PoseEstimate",
     "Proprioception",
     "RegionOfInterest",
+    "TagDetection",
     "TrackView",
 ]
 
@@ -107,6 +109,26 @@ class Detections:
         return Detections(np.hstack([centre_px - half, centre_px + half]), centre_px, score, class_id)
 
 
+@dataclass(frozen=True, eq=False)
+class TagDetection:
+    """One fiducial marker in one frame.
+
+    Attributes:
+        tag_id: number within the family.
+        corners_px: (4, 2) corners of the black square: upper left, upper right, lower right, lower left as the tag is
+            read.
+        sigma_px: standard deviation of a corner per axis.
+    """
+
+    tag_id: int
+    corners_px: Array
+    sigma_px: float
+
+    def __post_init__(self) -> None:
+        """Check the shape."""
+        check_shape("corners_px", self.corners_px, (4, 2))
+
+
 class Detector(Protocol):
     """Finds lights in a frame."""
 
@@ -158,6 +180,26 @@ class PoseEstimate:
         check_shape("covariance", self.covariance, (6, 6))
 
 
+@dataclass(frozen=True, eq=False)
+class AzimuthFix:
+    """Where the vehicle lies as seen from a rotating beacon, from the time at which its beam swept past.
+
+    Attributes:
+        time_s: vehicle time of the sweep.
+        azimuth_rad: azimuth of the camera in the station frame about the beacon, counter-clockwise from the approach
+            axis, in (-π, π].
+        sigma_rad: its standard deviation.
+        bearing: direction to the beacon in the camera frame at that time, with the range where it is known.
+        turns: beacon turns that the fix rests on.
+    """
+
+    time_s: float
+    azimuth_rad: float
+    sigma_rad: float
+    bearing: Bearing
+    turns: int = 1
+
+
 class TrackView(NamedTuple):
     """One track as others may see it: for recordings and for authentication's audit.
 
@@ -188,6 +230,7 @@ class Percept:
         array_count: authenticated array beacons in this frame.
         detections: the frame's detections.
         tracks: the tracks alive after this frame.
+        azimuth: a new azimuth from the rotating beacon, None in frames without one.
     """
 
     time_s: float
@@ -197,6 +240,7 @@ class Percept:
     array_count: int
     detections: Detections
     tracks: tuple[TrackView, ...] = ()
+    azimuth: AzimuthFix | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,135 @@
+"""The landing station of paper C as data: five lights and an AprilTag on a platform, guides, latch."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from auvdock.assets import asset
+from auvdock.core.beacons import BeaconCfg, BeaconLayout
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import load_toml
+
+__all__ = ["GuideCfg", "LandingLatchCfg", "LandingStationCfg", "TagCfg", "load_landing_station"]
+
+
+@dataclass(frozen=True)
+class TagCfg:
+    """An AprilTag of family 36h11, lying face up with its upper edge towards the head of the station."""
+
+    tag_id: int = 0
+    """Number within the family, 0 to 586."""
+    size_m: float = 0.2
+    """Edge of the black square, without the white margin."""
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Centre in the station frame."""
+    reflectance: float = 0.9
+    """Of the white cells; the black ones have a tenth of it."""
+
+    def __post_init__(self) -> None:
+        """Refuse what the family does not have."""
+        if not 0 <= self.tag_id <= 586:
+            raise ConfigError("station.tag.tag_id", self.tag_id, "a number of 0 to 586, family 36h11 has 587 tags")
+        if not 0.02 <= self.size_m <= 2.0:
+            raise ConfigError("station.tag.size_m", self.size_m, "an edge of 0.02 to 2 m")
+        if not 0.0 < self.reflectance <= 1.0:
+            raise ConfigError("station.tag.reflectance", self.reflectance, "a fraction above 0 and up to 1")
+
+
+@dataclass(frozen=True)
+class GuideCfg:
+    """The V-shaped guides at head and tail: pairs of plates that open upwards and catch the hull or keel."""
+
+    x_m: tuple[float, float] = (0.35, -0.35)
+    """Where head and tail guide stand along the centre line."""
+    thickness_m: float = 0.08
+    """Extent of each guide along the centre line."""
+    opening_half_angle_deg: float = 45.0
+    """Angle of each plate from the vertical."""
+    mouth_half_width_m: float = 0.25
+    """Half of the V's width at its top."""
+    seat_radius_m: float = 0.0955
+    """Radius of the round that comes to rest in the V: the hull's, or that of the vehicle's docking keel."""
+    seat_height_m: float = 0.3
+    """Height of that round's centre above the platform once seated."""
+    friction: float = 0.15
+    """Sliding friction, polymer lining on painted hull in water."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no guide."""
+        for name in ("thickness_m", "mouth_half_width_m", "seat_radius_m", "seat_height_m"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(f"station.guide.{name}", getattr(self, name), "a length above 0 m")
+        if not 15.0 <= self.opening_half_angle_deg <= 75.0:
+            raise ConfigError(
+                "station.guide.opening_half_angle_deg", self.opening_half_angle_deg, "an angle of 15 to 75 degrees"
+            )
+        if self.mouth_half_width_m <= self.seat_radius_m:
+            raise ConfigError("station.guide.mouth_half_width_m", self.mouth_half_width_m, "more than seat_radius_m")
+        if self.friction < 0.0:
+            raise ConfigError("station.guide.friction", self.friction, "0 or more")
+
+
+@dataclass(frozen=True)
+class LandingLatchCfg:
+    """When the active latch closes on the platform, and with that what "docked" means for a landing.
+
+    The arm reaches the vehicle when its seat (the centre of the round that rests in the guides) is within the
+    following of its place, and the vehicle is slow; it then pulls it tight. An episode is a success if the latch has
+    closed and held for `hold_s`, and the touchdown was no faster than `max_touchdown_m_s`.
+    """
+
+    along_m: float = 0.06
+    """Along the centre line (paper C steers to within 20 mm)."""
+    across_m: float = 0.04
+    """Across it."""
+    height_m: float = 0.03
+    """Above the seat."""
+    max_heading_deg: float = 5.0
+    """Between hull and centre line (paper C steers to within 3°)."""
+    max_tilt_deg: float = 10.0
+    """Roll or pitch."""
+    max_speed_m_s: float = 0.1
+    """Speed over ground at which the arm can close."""
+    max_touchdown_m_s: float = 0.3
+    """Vertical speed at the first contact with the station."""
+    hold_s: float = 0.5
+
+
+@dataclass(frozen=True)
+class LandingStationCfg:
+    """A platform on the floor. Station frame: origin in the platform's centre, x to its head, y to port, z up."""
+
+    tag: TagCfg = TagCfg()
+    guide: GuideCfg = GuideCfg()
+    latch: LandingLatchCfg = LandingLatchCfg()
+    depth_m: float = 10.0
+    """Depth of the platform's upper face."""
+    length_m: float = 1.8
+    """Platform along x."""
+    width_m: float = 1.0
+    """Platform along y."""
+    height_m: float = 0.25
+    """Of the platform above the floor."""
+    beacons: tuple[BeaconCfg, ...] = ()
+    """The lights, role "array", with their beams upwards."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no platform."""
+        for name in ("depth_m", "length_m", "width_m", "height_m"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise ConfigError(f"station.{name}", getattr(self, name), "a length above 0 m")
+
+    @property
+    def layout(self) -> BeaconLayout:
+        """All lights."""
+        return BeaconLayout(self.beacons)
+
+
+def load_landing_station(name: str = "landing") -> LandingStationCfg:
+    """A landing station preset by name.
+
+    Raises:
+        ConfigError: no such preset, or a file that does not fit.
+    """
+    return load_toml(LandingStationCfg, asset("stations", name))
