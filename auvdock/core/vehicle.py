@@ -120,6 +120,8 @@ class VehicleCfg:
     actuators: tuple[ActuatorCfg, ...]
     bow_camera: MountCfg
     belly_camera: MountCfg
+    seat_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Middle of the round that comes to rest in a landing station's guides, marine axes: of the hull, or of a keel."""
 
     @cached_property
     def added_mass_body(self) -> Array:
