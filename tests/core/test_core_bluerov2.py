@@ -1,4 +1,4 @@
-"""The BlueROV2 Heavy's data: published figures arrive in the matrices, thrusters span all axes, damping takes energy."""
+"""BlueROV2 Heavy's data: published figures arrive in the matrices, thrusters span all axes, damping takes energy."""
 
 from __future__ import annotations
 
