@@ -10,6 +10,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray, Image, IntArray, check_shape
 from auvdock.core.camera import Camera
+from auvdock.core.response import CameraResponse
 
 __all__ = [
     "BLUE",
@@ -42,11 +43,17 @@ class Frame:
         image: (H, W, 3) uint8, RGB.
         time_s: time of mid exposure.
         camera: the camera that took it.
+        exposure_s: exposure time.
+        gain: analogue gain.
+        response: how its codes stand for light.
     """
 
     image: Image
     time_s: float
     camera: Camera
+    exposure_s: float = 1.0
+    gain: float = 1.0
+    response: CameraResponse = CameraResponse()
 
     def __post_init__(self) -> None:
         """Check shape and type."""
@@ -74,16 +81,21 @@ class Detections:
         centre_px: (n, 2) light centres (for keypoint networks the keypoint), px.
         score: (n,) confidence in [0, 1].
         class_id: (n,) class, `BLUE` or `RED` for the beacon detectors.
+        flux: (n,) light of each spot above its surroundings with exposure and gain divided out, in a unit that is
+            constant over frames; None where the detector was not asked for it.
     """
 
     xyxy: Array
     centre_px: Array
     score: Array
     class_id: IntArray
+    flux: Array | None = None
 
     def __post_init__(self) -> None:
         """Check shapes."""
         n = len(self.score)
+        if self.flux is not None:
+            check_shape("flux", self.flux, (n,))
         check_shape("xyxy", self.xyxy, (n, 4))
         check_shape("centre_px", self.centre_px, (n, 2))
         check_shape("score", self.score, (n,))
@@ -95,7 +107,8 @@ class Detections:
 
     def select(self, index: IntArray | BoolArray) -> Detections:
         """Those at the given indices or under the given mask."""
-        return Detections(self.xyxy[index], self.centre_px[index], self.score[index], self.class_id[index])
+        flux = None if self.flux is None else self.flux[index]
+        return Detections(self.xyxy[index], self.centre_px[index], self.score[index], self.class_id[index], flux)
 
     @staticmethod
     def empty() -> Detections:
@@ -103,10 +116,12 @@ class Detections:
         return Detections(np.zeros((0, 4)), np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=np.int64))
 
     @staticmethod
-    def from_points(centre_px: Array, score: Array, class_id: IntArray, radius_px: float = 2.0) -> Detections:
+    def from_points(
+        centre_px: Array, score: Array, class_id: IntArray, radius_px: float = 2.0, flux: Array | None = None
+    ) -> Detections:
         """Detections with square boxes around given centres (n, 2)."""
         half = np.full((len(score), 2), radius_px)
-        return Detections(np.hstack([centre_px - half, centre_px + half]), centre_px, score, class_id)
+        return Detections(np.hstack([centre_px - half, centre_px + half]), centre_px, score, class_id, flux)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Frame
+from auvdock.core.response import CameraResponse
 from auvdock.optics.exposure import AutoExposure
 from auvdock.optics.lights_image import LightsImage, add_spot
 from auvdock.optics.metering import predicted_share
@@ -82,6 +83,7 @@ class UnderwaterCamera:
         self.lit = LitScene(camera, water, layout, nuisance, cfg, T_world_station)
         self.exposure = AutoExposure(cfg.exposure)
         self._cfg, self._camera, self._water = cfg, camera, water
+        self._response = CameraResponse(cfg.encoding, cfg.full_well_e, cfg.read_noise_e)
         self._sensor = Sensor(camera.width_px, camera.height_px, cfg)
         self._surfaces = Surfaces(self.lit, scene.model) if scene is not None and cfg.surfaces else None
         solid = self.lit.lens.solid_angle_sr.astype(np.float32)
@@ -117,7 +119,7 @@ class UnderwaterCamera:
         exposure_s, gain = self.exposure.exposure_s, self.exposure.gain
         image = self._sensor.expose(self.electrons(view, exposure_s, gain), gain)
         self.exposure.update(saturated_share(image))
-        return Shot(Frame(image, time_s, self._camera), view, exposure_s, gain)
+        return Shot(Frame(image, time_s, self._camera, exposure_s, gain, self._response), view, exposure_s, gain)
 
     def electrons(self, view: View, exposure_s: float, gain: float = 1.0) -> NDArray[np.float32]:
         """Mean photo-electrons (H, W, 3), red, green, blue, without noise; valid until the next call."""

@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, Image
+from auvdock.core.response import SATURATED_CODE
 from auvdock.optics.settings import ImagingCfg
 
 __all__ = ["SATURATED_CODE", "Sensor", "SensorScale", "saturated_share"]
 
-SATURATED_CODE = 250
-"""Samples from this code upwards count as saturated in the exposure metering."""
 _SPARE_PX = 64
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from auvdock.core.contracts import Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
+from auvdock.perception.flux import spot_flux
 from auvdock.perception.spots import brightest_channel, inside, light_class, noise_sigma
 
 __all__ = ["BlobCfg", "BlobDetector"]
@@ -39,6 +41,8 @@ class BlobCfg:
     """Blobs closer than this are one."""
     max_lights: int = 32
     """Only the brightest blobs are kept."""
+    flux: bool = False
+    """Measure each light's flux as well."""
 
     def __post_init__(self) -> None:
         """Refuse thresholds without meaning."""
@@ -73,6 +77,12 @@ class BlobDetector:
 
         Score = s / (s + 10) with s the brightness at the centre above its surroundings over the noise.
         """
+        found = self._find(frame, regions)
+        if not self._cfg.flux:
+            return found
+        return dataclasses.replace(found, flux=spot_flux(frame, found.centre_px))
+
+    def _find(self, frame: Frame, regions: Sequence[RegionOfInterest]) -> Detections:
         level = brightest_channel(frame.image)
         keypoints = self._detector.detect(level)
         if not keypoints:

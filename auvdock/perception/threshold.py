@@ -7,6 +7,7 @@ component is cut again at higher levels until it stops falling apart.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ import numpy as np
 from auvdock.core.arrays import Image
 from auvdock.core.contracts import Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
+from auvdock.perception.flux import spot_flux
 from auvdock.perception.spots import background, brightest_channel, crop_of, inside, light_class, noise_sigma
 
 __all__ = ["ThresholdCfg", "ThresholdDetector"]
@@ -43,6 +45,8 @@ class ThresholdCfg:
     little."""
     max_lights: int = 32
     """Only the components of greatest contrast are kept."""
+    flux: bool = False
+    """Measure each light's flux as well."""
 
     def __post_init__(self) -> None:
         """Refuse thresholds without meaning."""
@@ -78,6 +82,12 @@ class ThresholdDetector:
         A light's centre is the centroid, weighted by brightness above the level at which it was cut out, of the part
         brighter than half of its peak. Score = s / (s + 10) with s the peak above background over the noise.
         """
+        found = self._find(frame, regions)
+        if not self._cfg.flux:
+            return found
+        return dataclasses.replace(found, flux=spot_flux(frame, found.centre_px))
+
+    def _find(self, frame: Frame, regions: Sequence[RegionOfInterest]) -> Detections:
         if not regions:
             return self._detect(frame.image, 0, 0)
         height, width = frame.image.shape[:2]

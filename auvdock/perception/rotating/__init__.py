@@ -1,0 +1,1 @@
+"""The rotating beacon of paper B: its own formulae and method, and a better one beside them."""
