@@ -99,7 +99,8 @@ class Camera:
 
     @property
     def _max_tangent(self) -> float:
-        corner = self.normalise(np.array([[-0.5, -0.5], [self.width_px - 0.5, self.height_px - 0.5]]))
+        right, bottom = self.width_px - 0.5, self.height_px - 0.5
+        corner = self.normalise(np.array([[-0.5, -0.5], [right, bottom], [right, -0.5], [-0.5, bottom]]))
         return float(np.max(np.hypot(corner[:, 0], corner[:, 1])))
 
     def normalise(self, pixels: Array) -> Array:

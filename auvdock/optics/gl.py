@@ -19,6 +19,7 @@ __all__ = ["StaticRenderer", "offscreen_context", "probe_gl"]
 _NEAR_M, _FAR_M = 0.05, 80.0
 _COARSE = {"offsamples": 0, "shadowsize": 0, "numslices": 12, "numstacks": 6, "numquads": 1}
 """Quality while the context is made: no multisampling, no shadows, and few facets on what is round."""
+_UNSEEN_GROUP = 5
 _REMEDY = (
     "install libegl1 and libgl1-mesa-dri and set MUJOCO_GL=egl, or install libosmesa6 and set MUJOCO_GL=osmesa; "
     "or run without images: --fidelity beacons"
@@ -32,9 +33,18 @@ class StaticRenderer:
     after a fork or unpickling a new one is made in the new process.
     """
 
-    def __init__(self, model: MjModel, width_px: int, height_px: int, tangent_x: float, tangent_y: float) -> None:
-        """Keep the view: half width and half height of the image as tangents of angles."""
+    def __init__(
+        self,
+        model: MjModel,
+        width_px: int,
+        height_px: int,
+        tangent_x: float,
+        tangent_y: float,
+        hidden_geoms: tuple[str, ...] = (),
+    ) -> None:
+        """Keep the view, half width and half height as tangents of angles, and the names of geoms to leave out."""
         self._model = model
+        self._hidden = hidden_geoms
         self._size = (width_px, height_px)
         self._tangents = (tangent_x, tangent_y)
         self._process = -1
@@ -48,11 +58,13 @@ class StaticRenderer:
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but OpenGL's state, which lives in one process."""
-        return {"model": self._model, "size": self._size, "tangents": self._tangents}
+        return {"model": self._model, "size": self._size, "tangents": self._tangents, "hidden": self._hidden}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A renderer without a context."""
-        self.__init__(state["model"], *state["size"], *state["tangents"])
+        width, height = state["size"]
+        tangent_x, tangent_y = state["tangents"]
+        self.__init__(state["model"], width, height, tangent_x, tangent_y, state["hidden"])
 
     def close(self) -> None:
         """Free the context, if this process has one."""
@@ -125,7 +137,14 @@ class StaticRenderer:
         for flag in ("SHADOW", "REFLECTION", "SKYBOX", "FOG", "HAZE"):
             scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = 0
         static = mujoco.mjtCatBit.mjCAT_STATIC
-        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), static, scene)
+        option = mujoco.MjvOption()
+        found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) for name in self._hidden]
+        groups = {geom: int(model.geom_group[geom]) for geom in found if geom >= 0}
+        for geom in groups:
+            model.geom_group[geom] = _UNSEEN_GROUP
+        mujoco.mjv_updateScene(model, data, option, None, mujoco.MjvCamera(), static, scene)
+        for geom, group in groups.items():
+            model.geom_group[geom] = group
         scene.nlight = 1
         light = scene.lights[0]
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL

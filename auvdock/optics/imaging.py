@@ -13,18 +13,26 @@ from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Frame
+from auvdock.core.landing_station import TagCfg
 from auvdock.core.response import CameraResponse
 from auvdock.optics.exposure import AutoExposure
+from auvdock.optics.faults import FaultCfg, TagCover
+from auvdock.optics.lamp import LampCfg
 from auvdock.optics.lights_image import LightsImage, add_spot
 from auvdock.optics.metering import predicted_share
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.scene import LitScene, View
-from auvdock.optics.sensor import Sensor, saturated_share
+from auvdock.optics.sensor import Sensor, SensorScale, saturated_share
 from auvdock.optics.settings import ExposureCfg, ImagingCfg
 from auvdock.optics.surfaces import Surfaces
+from auvdock.optics.tag_image import TagImage
+from auvdock.optics.tag_scene import TagScene
 from auvdock.optics.water import WaterCfg
 
-__all__ = ["ExposureCfg", "HasModel", "ImagingCfg", "Shot", "UnderwaterCamera"]
+TAG_GEOM = "tag"
+"""Name of the geom that shows the tag in MuJoCo's model, for views other than this camera's."""
+
+__all__ = ["TAG_GEOM", "ExposureCfg", "HasModel", "ImagingCfg", "Shot", "UnderwaterCamera"]
 
 
 class HasModel(Protocol):
@@ -68,6 +76,11 @@ class UnderwaterCamera:
         cfg: ImagingCfg,
         T_world_station: Array,
         scene: HasModel | None = None,
+        *,
+        seen_from: str = "front",
+        tag: TagCfg | None = None,
+        lamp: LampCfg | None = None,
+        faults: FaultCfg | None = None,
     ) -> None:
         """Precompute tables; no OpenGL context is made before a frame needs one.
 
@@ -79,13 +92,32 @@ class UnderwaterCamera:
             cfg: the camera as an instrument.
             T_world_station: (4, 4) pose of the station frame.
             scene: owner of the MuJoCo model whose static geoms are drawn; without it only lights are.
+            seen_from: "front" for a funnel along x, "above" for a platform whose lights shine up.
+            tag: a marker on the station; a geom named `TAG_GEOM` of the model is left out in its favour.
+            lamp: the vehicle's own lamps beside the camera.
+            faults: lights that are dead, and when the tag is covered.
         """
-        self.lit = LitScene(camera, water, layout, nuisance, cfg, T_world_station)
+        faults = faults if faults is not None else FaultCfg()
+        self.lit = LitScene(
+            camera,
+            water,
+            layout,
+            nuisance,
+            cfg,
+            T_world_station,
+            seen_from=seen_from,
+            lamp=lamp,
+            dead_lights=faults.dead_lights,
+        )
+        self.tag = TagImage(TagScene(self.lit, tag)) if tag is not None else None
+        self._cover = TagCover(faults)
+        self._hidden = False
         self.exposure = AutoExposure(cfg.exposure)
         self._cfg, self._camera, self._water = cfg, camera, water
         self._response = CameraResponse(cfg.encoding, cfg.full_well_e, cfg.read_noise_e)
         self._sensor = Sensor(camera.width_px, camera.height_px, cfg)
-        self._surfaces = Surfaces(self.lit, scene.model) if scene is not None and cfg.surfaces else None
+        hidden = (TAG_GEOM,) if tag is not None else ()
+        self._surfaces = Surfaces(self.lit, scene.model, hidden) if scene is not None and cfg.surfaces else None
         solid = self.lit.lens.solid_angle_sr.astype(np.float32)
         self._solid_angle = solid[:, :, None]
         self._buffer = np.empty((camera.height_px, camera.width_px, 3), dtype=np.float32)
@@ -97,6 +129,7 @@ class UnderwaterCamera:
         self._lights = LightsImage(self.lit.lens, self.lit.lights, self._water, self.lit.spots)
         self._sensor.reset(self.lit.sensor_rng)
         self.exposure.reset()
+        self._cover.reset()
 
     def close(self) -> None:
         """Free OpenGL's context, if one was made."""
@@ -114,12 +147,23 @@ class UnderwaterCamera:
     def take(self, T_world_body: Array, time_s: float) -> Shot:
         """Take a frame as `capture` does, with what it was made of: for fitting detection models."""
         view = self.lit.look(T_world_body, time_s)
+        if self.tag is not None:
+            self._hidden = self._cover.hidden(self.tag.scene.height_m(view.T_world_camera), time_s)
         if not self.exposure.settled:
-            self.exposure.settle(predicted_share(self.lit, view))
+            self._settle(view)
         exposure_s, gain = self.exposure.exposure_s, self.exposure.gain
         image = self._sensor.expose(self.electrons(view, exposure_s, gain), gain)
         self.exposure.update(saturated_share(image))
         return Shot(Frame(image, time_s, self._camera, exposure_s, gain, self._response), view, exposure_s, gain)
+
+    def _settle(self, view: View) -> None:
+        """Choose the first exposure: from the lights, or from a trial picture where tag and lamp count as well."""
+        if self.tag is None and self.lit.lamp is None:
+            self.exposure.settle(predicted_share(self.lit, view))
+            return
+        bright = np.sort(self.electrons(view, 1.0), axis=None)
+        level = SensorScale(self._cfg, 1.0).saturated_e
+        self.exposure.settle(lambda s: 1.0 - float(np.searchsorted(bright, level / s)) / bright.size)
 
     def electrons(self, view: View, exposure_s: float, gain: float = 1.0) -> NDArray[np.float32]:
         """Mean photo-electrons (H, W, 3), red, green, blue, without noise; valid until the next call."""
@@ -131,26 +175,44 @@ class UnderwaterCamera:
         fine_size = (lens.shape[1] * lens.factor, lens.shape[0] * lens.factor)
         surfaces = self._surfaces
         depth_m = -float(view.T_world_camera[2, 3])
+        drawn: NDArray[np.float32] | None = None
         if surfaces is not None and surfaces.visible(view.T_world_camera[:3, 3], exposure_s * gain):
             rows, columns = surfaces.shape
+            drawn = surfaces.electrons(view.T_world_camera, exposure_s)
+            self._add_backscatter(coarse, surfaces.distance, exposure_s)
             image = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR)
-            image += surfaces.electrons(view.T_world_camera, exposure_s)
+            image += drawn
         else:
+            self._add_backscatter(coarse, None, exposure_s)
             image = coarse
             veil = self.lit.veil_w_m2_sr(depth_m)
             if veil.max() > 0.0:
-                image += (self.lit.electrons_per_j @ veil * exposure_s).astype(np.float32) * self._solid_angle
+                even = (self.lit.electrons_per_j @ veil * exposure_s).astype(np.float32) * self._solid_angle
+                image += even
+                drawn = even
         if fine_size == size:
             cv2.resize(image, size, self._buffer, interpolation=cv2.INTER_LINEAR)
         else:
             whole = cv2.resize(image, fine_size, interpolation=cv2.INTER_LINEAR)
             self._buffer[:] = whole[: size[1], : size[0]]
+        if self.tag is not None:
+            self.tag.add(self._buffer, view.T_world_camera, exposure_s, drawn, hidden=self._hidden)
         near, shown = lens.locate(received.ray_camera, self._lights.reach_px)
         index = lit[shown[lit]]
         self._lights.add_fine(self._buffer, received, near, index, exposure_s)
         if view.flakes is not None:
             self._add_flakes(view, exposure_s)
         return self._buffer
+
+    def _add_backscatter(
+        self, image: NDArray[np.float32], distance: NDArray[np.float32] | None, exposure_s: float
+    ) -> None:
+        """Add what the vehicle's own lamps scatter back to an image on the coarse grid (rows, columns, 3)."""
+        if self.lit.lamp is None:
+            return
+        radiance = self.lit.lamp.backscatter(distance)
+        light = cv2.transform(radiance, (self.lit.electrons_per_j * exposure_s).astype(np.float32))
+        image += light * self._solid_angle
 
     def _add_flakes(self, view: View, exposure_s: float) -> None:
         flakes = view.flakes

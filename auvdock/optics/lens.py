@@ -17,19 +17,20 @@ class Lens:
     """A camera's geometry, precomputed once on a coarse grid of pixels.
 
     Attributes:
-        factor: image pixels per coarse pixel (4 at 640 × 360).
+        factor: image pixels per coarse pixel (4 at 640 × 360 and at 800 × 600).
         shape: (rows, columns) of the coarse grid.
         rays: (rows × columns, 3) unit rays through the coarse pixels' centres.
         metric: (rows, columns, 3) tensor g11, g12, g22: an offset (x, y) px subtends √(g11 x² + 2 g12 x y + g22 y²).
         solid_angle_sr: (rows, columns) solid angle of one image pixel, √det g.
         aperture_m2: area of the entrance pupil times the lens' transmission.
         rad_per_px: angle of a pixel in the middle of the image.
+        max_tangent: tangent of the angle between the optical axis and the farthest corner of the image.
     """
 
     def __init__(self, camera: Camera, cfg: ImagingCfg) -> None:
         """Precompute the maps."""
         self.camera = camera
-        self.factor = max(1, round(camera.width_px / 160))
+        self.factor = _coarse_factor(camera.width_px)
         columns, rows = -(-camera.width_px // self.factor), -(-camera.height_px // self.factor)
         self.shape = (rows, columns)
         self._x = (np.arange(columns) + 0.5) * self.factor - 0.5
@@ -54,14 +55,21 @@ class Lens:
         self.rad_per_px = 1.0 / focal_px
         focal_m = focal_px * cfg.sensor_width_m / camera.width_px
         self.aperture_m2 = math.pi / 4.0 * (focal_m / cfg.f_number) ** 2 * cfg.lens_transmission
-        corner = camera.normalise(np.array([[-0.5, -0.5], [camera.width_px - 0.5, camera.height_px - 0.5]]))
+        last_x, last_y = camera.width_px - 0.5, camera.height_px - 0.5
+        corner = camera.normalise(np.array([[-0.5, -0.5], [last_x, last_y], [last_x, -0.5], [-0.5, last_y]]))
         self._max_tangent2 = float(np.max(np.sum(corner**2, axis=1)))
+        self.max_tangent = math.sqrt(self._max_tangent2)
 
     def metric_at(self, pixels: Array) -> Array:
         """(n, 3) metric tensors at pixels (n, 2); outside the image those of the border."""
         columns = np.clip((pixels[:, 0] / self.factor).astype(np.int64), 0, self.shape[1] - 1)
         rows = np.clip((pixels[:, 1] / self.factor).astype(np.int64), 0, self.shape[0] - 1)
         return self.metric[rows, columns]
+
+    def solid_angle_at(self, pixels: Array) -> Array:
+        """(n,) solid angle of the pixels (n, 2); outside the image that of the border."""
+        metric = self.metric_at(pixels)
+        return np.sqrt(metric[:, 0] * metric[:, 2] - metric[:, 1] ** 2)
 
     def locate(self, rays: Array, margin_px: float = 0.0) -> tuple[Array, BoolArray]:
         """Pixels (n, 2) of rays (n, 3) in the camera frame and whether they lie within `margin_px` of the image.
@@ -89,3 +97,9 @@ class Lens:
 
 
 _AHEAD = np.array([0.0, 0.0, 1.0])
+
+
+def _coarse_factor(width_px: int) -> int:
+    """Image pixels per coarse pixel: some 160 columns, and a multiple of 2 or 3 so that surfaces fit in between."""
+    factor = max(1, round(width_px / 160))
+    return factor if factor % 2 == 0 or factor % 3 == 0 else max(1, factor - 1)

@@ -43,8 +43,8 @@ class Received(NamedTuple):
 class LightSet:
     """Lamps in one water, in the station frame.
 
-    A lamp that is set back behind the plane of the array sits inside the funnel whose rim carries the array: from
-    outside it is seen through the mouth only.
+    With a funnel, a lamp that is set back behind the plane of the array sits inside the funnel whose rim carries the
+    array: from outside it is seen through the mouth only. Without one, nothing hides a lamp.
     """
 
     def __init__(
@@ -52,6 +52,8 @@ class LightSet:
         layout: BeaconLayout,
         water: WaterCfg,
         extra: Sequence[BeaconCfg] = (),
+        *,
+        funnel: bool = True,
     ) -> None:
         """Precompute what does not depend on the pose.
 
@@ -59,6 +61,7 @@ class LightSet:
             layout: the station's beacons; they come first.
             water: the water between lamps and camera.
             extra: further lamps, in the station frame.
+            funnel: the station is a funnel along x whose rim carries the array.
         """
         lamps = (*layout.beacons, *extra)
         self.count = len(lamps)
@@ -80,7 +83,7 @@ class LightSet:
         self._rim_radius2 = float(np.max(np.sum((array[:, 1:] - self._rim_centre) ** 2, axis=1)))
         setback = self._rim_x - self.positions_m[:, 0]
         inside = np.sum((self.positions_m[:, 1:] - self._rim_centre) ** 2, axis=1) < self._rim_radius2
-        self._recessed = np.flatnonzero(((setback > 0.05) & inside)[: self.station_count])
+        self._recessed = np.flatnonzero(((setback > 0.05) & inside & funnel)[: self.station_count])
         self._setback = setback[self._recessed]
         self._recessed_yz = self.positions_m[self._recessed, 1:] - self._rim_centre
 

@@ -12,6 +12,8 @@ from auvdock.core.beacons import BeaconCfg, BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.transforms import invert
 from auvdock.optics.bands import BANDS_NM, electrons_per_joule
+from auvdock.optics.faults import dead_indices
+from auvdock.optics.lamp import LampCfg, VehicleLamp
 from auvdock.optics.lens import Lens
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_streams
 from auvdock.optics.radiometry import LightSet, Received
@@ -55,12 +57,36 @@ class LitScene:
         nuisance: NuisanceCfg,
         cfg: ImagingCfg,
         T_world_station: Array,
+        *,
+        seen_from: str = "front",
+        lamp: LampCfg | None = None,
+        dead_lights: tuple[str, ...] = (),
     ) -> None:
-        """Precompute what does not change within an episode."""
+        """Precompute what does not change within an episode.
+
+        Args:
+            camera: intrinsics, distortion and mounting.
+            water: what lies between.
+            layout: the station's beacons.
+            nuisance: what makes the scene hard.
+            cfg: the camera as an instrument.
+            T_world_station: (4, 4) pose of the station frame.
+            seen_from: "front" for a funnel along x, "above" for a platform whose lights shine up.
+            lamp: the vehicle's own lamps beside the camera, None for none.
+            dead_lights: names of the station's lights that do not shine.
+
+        Raises:
+            ConfigError: a dead light that the station does not have.
+        """
         self.camera, self.water, self.layout, self.nuisance, self.cfg = camera, water, layout, nuisance, cfg
         self.T_world_station = T_world_station
         self._T_station_world = invert(T_world_station)
+        self._seen_from = seen_from
+        self.dead = dead_indices(layout, dead_lights)
+        """Indices of the station's lights that do not shine."""
         self.lens = Lens(camera, cfg)
+        self.lamp = VehicleLamp(lamp, self.lens, water) if lamp is not None and lamp.power_w > 0.0 else None
+        """The vehicle's own lamps."""
         self._scale = (1.0, SensorScale(cfg, 1.0))
         self.electrons_per_j = np.array([electrons_per_joule(nm) for nm in BANDS_NM]).T * self.lens.aperture_m2
         """(3, 3) electrons per second of each channel (row) for 1 W/(m² sr) over 1 sr in each band (column)."""
@@ -111,6 +137,9 @@ class LitScene:
         """Light at the camera now; advances flicker and occlusions to `time_s`."""
         T_world_camera = T_world_body @ self.camera.T_body_camera
         received = self.lights.received(self._T_station_world @ T_world_camera)
+        if len(self.dead):
+            received.core_w_m2[self._unlit] = 0.0
+            received.halo_w_m2[self._unlit] = 0.0
         if self._fluctuates:
             factor = self._fluctuate(time_s, received.range_m)[self._source]
             received.core_w_m2[:] *= factor
@@ -132,18 +161,22 @@ class LitScene:
     def _set_lights(self, strangers: tuple[BeaconCfg, ...]) -> None:
         mirrored = [k for k, beacon in enumerate(self.layout.beacons) if beacon.role != "entrance"]
         images = self._images(mirrored) if self._mirrors else ()
-        self.lights = LightSet(self.layout, self.water, (*strangers, *images))
+        self.lights = LightSet(self.layout, self.water, (*strangers, *images), funnel=self._seen_from == "front")
         self._image_slice = slice(self.lights.count - len(images), self.lights.count)
         own = self.lights.station_count
         # Whose fluctuation each light shares: its own, none (the last entry), or that of the lamp it mirrors.
         source = [*range(own), *(own for _ in strangers), *mirrored[: len(images)]]
         self._source = np.array(source, dtype=np.int64)
+        self._unlit = np.flatnonzero(np.isin(self._source, self.dead))
         self.spots = SpotModel(self.lens, self.lights, self.water, self.cfg)
 
     def _strangers(self, rng: np.random.Generator) -> tuple[BeaconCfg, ...]:
         level = self.nuisance.interference_level
         lamps: list[BeaconCfg] = []
         for index in range(level.count):
+            if self._seen_from == "above":
+                lamps.append(_stranger_below(index, level.power_w, rng))
+                continue
             x, y, z = rng.uniform((-6.0, -6.0, -2.5), (2.0, 6.0, 3.0))
             # Keep clear of the mouth: a lamp inside the funnel would be the station's.
             y += math.copysign(1.5, y)
@@ -209,6 +242,14 @@ class LitScene:
         self._occluded_until[starts] = ends[starts]
         factor[self._occluded_until > time_s] *= snow.occlusion_transmission
         return np.append(factor, 1.0)
+
+
+def _stranger_below(index: int, power_w: float, rng: np.random.Generator) -> BeaconCfg:
+    """A lamp that lies about near a platform on the floor, 1.5 m to 4 m from its centre, and shines up."""
+    distance, bearing = rng.uniform((1.5, -math.pi), (4.0, math.pi))
+    place = (float(distance * math.cos(bearing)), float(distance * math.sin(bearing)), float(rng.uniform(-0.2, 1.0)))
+    nm = 450.0 if rng.random() < 0.5 else 530.0
+    return BeaconCfg(f"stranger{index}", "array", place, (0.0, 0.0, 1.0), nm, power_w, 0.35, 90.0)
 
 
 def _fresnel_from_water(cosine: Array) -> Array:

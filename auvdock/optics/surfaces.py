@@ -3,7 +3,7 @@
 Per band, I = J e^{-β_D z} + B∞ (1 - e^{-β_B z}) with z the distance along the ray. The direct signal carries the image
 and loses all that is scattered: β_D = c = a + b. The veil is lit by daylight from all sides, to which forward
 scattering is no loss: β_B = a + b_b (Gordon 1973). J = ρ E / π, with E the daylight at depth, shaded from above, plus
-the spill light of the station's own lamps, Φ s / (4π d²) e^{-a d} with a quarter of it for the mean obliquity.
+the light of lamps: see `optics.illumination` for the station's and `optics.lamp` for the vehicle's own.
 """
 
 from __future__ import annotations
@@ -16,15 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
-from auvdock.optics.bands import BANDS_NM
 from auvdock.optics.gl import StaticRenderer
+from auvdock.optics.illumination import LAMP_M2, Illumination
 from auvdock.optics.scene import LitScene
 from auvdock.sim.mj import MjModel, mujoco
 
 __all__ = ["Surfaces"]
 
-_LAMP_M2 = 0.05**2
-"""Least squared distance from a lamp to what it lights: its housing."""
 _GLARE_M2 = 0.15**2
 """Closer to a lamp than this, its own core and halo outshine what it lights."""
 _GREATEST_RADIANCE = 1.0 / math.pi
@@ -33,8 +31,14 @@ _GREATEST_RADIANCE = 1.0 / math.pi
 class Surfaces:
     """Draws the static geoms of a model at a half or a third of the resolution, through water and lens."""
 
-    def __init__(self, lit: LitScene, model: MjModel) -> None:
-        """Precompute lens maps and what lamps do to each geom; no OpenGL yet."""
+    def __init__(self, lit: LitScene, model: MjModel, hidden_geoms: tuple[str, ...] = ()) -> None:
+        """Precompute lens maps and what lamps do to each geom; no OpenGL yet.
+
+        Args:
+            lit: lamps, water and lens.
+            model: the MuJoCo model whose static geoms are drawn.
+            hidden_geoms: names of geoms that are left out, because something else draws them.
+        """
         self._lit = lit
         camera, lens = lit.camera, lit.lens
         step = next(step for step in (3, 2, 1) if lens.factor % step == 0)
@@ -47,13 +51,15 @@ class Surfaces:
         half_x, half_y = (1.02 * float(np.abs(tangents[:, :, k]).max()) for k in range(2))
         width = round(columns * half_x / float(np.abs(tangents[rows // 2, :, 0]).max()))
         height = round(rows * half_y / float(np.abs(tangents[:, columns // 2, 1]).max()))
-        self._renderer = StaticRenderer(model, width, height, half_x, half_y)
+        self._renderer = StaticRenderer(model, width, height, half_x, half_y, hidden_geoms)
         map_x = (tangents[:, :, 0] / half_x + 1.0) * 0.5 * width - 0.5
         # The renderer's rows run from the bottom up.
         map_y = (1.0 - tangents[:, :, 1] / half_y) * 0.5 * height - 0.5
         self._map_x, self._map_y = map_x.astype(np.float32), map_y.astype(np.float32)
         self._stretch = np.sqrt(1.0 + np.sum(tangents**2, axis=2)).astype(np.float32)
         self._rays = lens.rays.astype(np.float32)
+        self.distance: NDArray[np.float32] | None = None
+        """Distance along the rays of the lens' coarse grid (rows, columns) in the last image; `inf` for nothing."""
 
         water = lit.water
         self._beta_direct = water.attenuation
@@ -61,14 +67,9 @@ class Surfaces:
         solid = cv2.resize(lens.solid_angle_sr.astype(np.float32), (columns, rows), interpolation=cv2.INTER_LINEAR)
         self._solid_angle = np.repeat(solid[:, :, None], 3, axis=2)
 
-        count = lit.lights.station_count
-        nm = np.array([beacon.wavelength_nm for beacon in lit.layout.beacons])
-        bands = np.array([np.interp(nm, BANDS_NM, row) for row in np.eye(3)]).T
-        spill = lit.lights.flux_w[:count] * lit.cfg.lamp_spill / (16.0 * math.pi)
-        rotation, origin = lit.T_world_station[:3, :3], lit.T_world_station[:3, 3]
-        self._lamps = lit.lights.positions_m[:count] @ rotation.T + origin
-        self._spill_w_sr = spill[:, None] * bands
-        self._lamp_absorption = lit.lights.absorption_per_m[:count]
+        light = Illumination(lit)
+        self._lamps, self._spill_w_sr = light.lamps_m, light.spill_w_sr
+        self._lamp_absorption = light.absorption_per_m
         self._geoms = _Geoms(model)
         nearest = np.array([self._geoms.distance_m(lamp) for lamp in self._lamps]).T
         loss = np.exp(-self._lamp_absorption * nearest) / np.maximum(nearest**2, _GLARE_M2)
@@ -82,7 +83,10 @@ class Surfaces:
         """Whether any surface can stand out of the noise, in the most favourable case, from a position (3,)."""
         daylight = self._lit.daylight_w_m2(-float(position_world_m[2]))
         through = np.exp(-self._geoms.distance_m(position_world_m)[:, None] * self._beta_direct)
-        radiance = (self._lamp_irradiance + daylight) * through * _GREATEST_RADIANCE
+        irradiance = self._lamp_irradiance + daylight
+        if self._lit.lamp is not None:
+            irradiance = irradiance + self._lit.lamp.brightest(self._geoms.distance_m(position_world_m))
+        radiance = irradiance * through * _GREATEST_RADIANCE
         per_pixel = self._lit.electrons_per_j.T * (sensitivity_s * self._lit.lens.rad_per_px**2)
         signal = float((radiance @ per_pixel).max(initial=0.0))
         veil = float(self._lit.veil_e_s(-float(position_world_m[2])).max()) * sensitivity_s
@@ -128,16 +132,21 @@ class Surfaces:
     def _lamp_light(self, T_world_camera: Array, distance: NDArray[np.float32]) -> NDArray[np.float32]:
         """Spill light of the lamps (rows, columns, 3) on what is seen, per band, on the coarse grid of the lens."""
         rows, columns = self._lit.lens.shape
-        z = cv2.resize(distance, (columns, rows), interpolation=cv2.INTER_NEAREST).reshape(-1, 1)
+        coarse = cv2.resize(distance, (columns, rows), interpolation=cv2.INTER_NEAREST)
+        self.distance = np.asarray(coarse, dtype=np.float32)
+        z = self.distance.reshape(-1, 1)
         points = self._rays * z
         lamps = ((self._lamps - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]).astype(np.float32)
         d2 = points @ (-2.0 * lamps.T)
         d2 += np.sum(lamps**2, axis=1)
         d2 += z * z
-        np.maximum(d2, np.float32(_LAMP_M2), out=d2)
+        np.maximum(d2, np.float32(LAMP_M2), out=d2)
         weight = cv2.exp(cv2.sqrt(d2) * (-self._lamp_absorption).astype(np.float32))
         weight /= d2
-        return (weight @ self._spill_w_sr.astype(np.float32)).reshape(rows, columns, 3)
+        light = weight @ self._spill_w_sr.astype(np.float32)
+        if self._lit.lamp is not None:
+            light += self._lit.lamp.irradiance(np.asarray(points, dtype=np.float64))
+        return light.reshape(rows, columns, 3)
 
 
 def _exponential(distance: NDArray[np.float32], per_m: Array) -> NDArray[np.float32]:
