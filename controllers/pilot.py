@@ -24,6 +24,7 @@ from auvdock.controllers.modes import (
     next_mode,
 )
 from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
+from auvdock.controllers.rotating.config import RotatingControlCfg
 from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of, turn
 from auvdock.controllers.steering import (
     Place,
@@ -75,6 +76,8 @@ class ControlCfg:
     """Looking around."""
     modes: ModeCfg = field(default_factory=ModeCfg)
     """Mode machine."""
+    rotating: RotatingControlCfg = field(default_factory=RotatingControlCfg)
+    """The way to the cone before the mouth, by a rotating beacon."""
 
 
 class PilotState(NamedTuple):
@@ -148,7 +151,7 @@ class ConicalPilot:
         self._funnel_length_m = station.funnel.length_m
         self._end_m = station.funnel.length_m + station.funnel.tube_length_m + 0.3
         self._has_entrance = bool(entrance)
-        self._reach_m_s = sway_reach_m_s(vehicle, self.allocator, cfg.guidance.mid_speed_m_s, cfg.guidance.sway_share)
+        self.reach_m_s = sway_reach_m_s(vehicle, self.allocator, cfg.guidance.mid_speed_m_s, cfg.guidance.sway_share)
         self._pattern = search_pattern(cfg.search)
         self._idle = np.zeros(len(vehicle.actuators))
 
@@ -177,23 +180,32 @@ class ConicalPilot:
     ) -> tuple[Command, PilotState]:
         """One control period: estimate, judge the mode, steer, allocate."""
         senses = read_senses(proprioception)
+        state, place, facts = self.observe(state, percept, senses)
+        mode = next_mode(state.mode, facts, self.cfg.modes)
+        if mode != state.mode:
+            state = self.enter(state, mode, place, senses)
+        return self.fly(state, place, senses)
+
+    def observe(
+        self, state: PilotState, percept: Percept | None, senses: Senses
+    ) -> tuple[PilotState, Place | None, Facts]:
+        """The first half of a control period: estimates and progress, and what the mode is judged by."""
         if state.since_s is None:
             state = state._replace(
                 since_s=senses.time_s, anchor_rad=senses.yaw_rad, anchor_depth_m=senses.depth_m, best_s=senses.time_s
             )
         relative = self._track(state.relative, percept, senses)
         sight = self._look(state.sight, percept, senses)
-        place = self._place(relative, senses) if relative is not None else None
+        place = self.place(relative, senses) if relative is not None else None
         jumped = _restarts(relative) > _restarts(state.relative)
         state = self._progress(state, place, senses.time_s)._replace(relative=relative, sight=sight)
-        facts = self._facts(state, place, senses, jumped)
-        mode = next_mode(state.mode, facts, self.cfg.modes)
-        if mode != state.mode:
-            state = self._enter(state, mode, place, senses)
-        if mode == DOCKED:
-            return Command(self._idle.copy(), mode=mode), state
-        steering = self._steer(state, place, senses)
-        return self._act(state, steering, place, senses)
+        return state, place, self._facts(state, place, senses, jumped)
+
+    def fly(self, state: PilotState, place: Place | None, senses: Senses) -> tuple[Command, PilotState]:
+        """The second half: steer in the state's mode and command the actuators."""
+        if state.mode == DOCKED:
+            return Command(self._idle.copy(), mode=state.mode), state
+        return self.act(state, self._steer(state, place, senses), place, senses)
 
     def _track(self, relative: RelativeState | None, percept: Percept | None, senses: Senses) -> RelativeState | None:
         """Relative state after this period."""
@@ -214,19 +226,21 @@ class ConicalPilot:
         bearing = percept.long_range
         if bearing is None:
             return sight._replace(frames=0) if sight is not None and sight.frames else sight
-        azimuth, elevation = self._world_direction(bearing, senses)
+        azimuth, elevation = self.compass_direction(bearing, senses)
         if not math.isfinite(azimuth + elevation):
             return sight
         range_m = bearing.range_m if bearing.range_m is not None and math.isfinite(bearing.range_m) else None
         return sighted(sight, senses.time_s, azimuth, elevation, range_m, self.cfg.guidance.sight_smoothing)
 
-    def _world_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
+    def compass_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
+        """Compass azimuth, positive to port, and elevation of a bearing in rad."""
         x, y, z = bearing.ray_camera.tolist()
         body = rotate(self._R_body_camera, (x, y, z))
         east, north, up = rotate(turn(senses.level, senses.yaw_rad), body)
         return math.atan2(north, east), math.atan2(up, math.hypot(east, north))
 
-    def _place(self, relative: RelativeState, senses: Senses) -> Place:
+    def place(self, relative: RelativeState, senses: Senses) -> Place:
+        """Where the nose is in approach axes."""
         heading = senses.yaw_rad - relative.axis_yaw_rad
         x, y, z = rotate(turn(senses.level, heading), self._camera_to_nose)
         px, py, pz = relative.camera_m
@@ -277,7 +291,7 @@ class ConicalPilot:
             giving_up=state.giving_up,
         )
 
-    def _enter(self, state: PilotState, mode: str, place: Place | None, senses: Senses) -> PilotState:
+    def enter(self, state: PilotState, mode: str, place: Place | None, senses: Senses) -> PilotState:
         """Book-keeping at a change of mode."""
         attempts, giving_up = state.attempts, state.giving_up
         if mode == ABORT:
@@ -313,7 +327,7 @@ class ConicalPilot:
                 self._lamp_height_m,
                 senses,
                 current,
-                self._reach_m_s,
+                self.reach_m_s,
                 cfg.modes.min_blind_range_m,
                 cfg.guidance,
             )
@@ -329,13 +343,13 @@ class ConicalPilot:
                 self._funnel_length_m,
                 senses,
                 current,
-                self._reach_m_s,
+                self.reach_m_s,
                 cfg.guidance,
                 cfg.modes,
                 self._dt_s,
             )
         if mode == ABORT and place is not None:
-            return back_off(place, senses, current, self._reach_m_s, cfg.guidance)
+            return back_off(place, senses, current, self.reach_m_s, cfg.guidance)
         hold = search(
             in_mode_s, state.anchor_rad, state.anchor_depth_m, state.side, place is None, self._pattern, cfg.search
         )
@@ -344,7 +358,7 @@ class ConicalPilot:
             return Steering(point)
         return hold
 
-    def _act(
+    def act(
         self, state: PilotState, steering: Steering, place: Place | None, senses: Senses
     ) -> tuple[Command, PilotState]:
         """Autopilot, allocation, and the log entry."""

@@ -21,6 +21,7 @@ __all__ = [
     "Steering",
     "along_axis",
     "back_off",
+    "ground_course",
     "search",
     "search_pattern",
     "sighted",
@@ -221,7 +222,7 @@ def towards_light(
         speed = min(speed, cfg.mid_speed_m_s)
     climb = max(speed, 0.3) * math.tan(min(0.7, max(-0.7, sight.elevation_rad - wanted)))
     climb = _clip(climb, cfg.max_vertical_speed_m_s)
-    setpoint, offset = _ground_course(
+    setpoint, offset = ground_course(
         speed, 0.0, climb, sight.azimuth_rad, cfg.max_crab_rad, senses, current_m_s, reach_m_s
     )
     return Steering(setpoint, offset_rad=offset)
@@ -273,7 +274,7 @@ def along_axis(
     bearing, view = 0.0, math.pi
     if place.distance_m > 1.0:
         bearing, view = math.atan2(-place.port_m, place.distance_m), guidance.max_view_angle_rad
-    setpoint, offset = _ground_course(
+    setpoint, offset = ground_course(
         forward, port, up, place.axis_yaw_rad, limit, senses, current_m_s, reach_m_s, (bearing - view, bearing + view)
     )
     return Steering(setpoint, port_integral, up_integral, offset)
@@ -285,13 +286,13 @@ def back_off(place: Place, senses: Senses, current_m_s: Vector, reach_m_s: float
     if place.distance_m > 0.0:
         port = _clip(-0.25 * place.port_m, cfg.max_cross_speed_m_s)
         up = _clip(-0.25 * place.up_m, cfg.max_cross_speed_m_s)
-    setpoint, offset = _ground_course(
+    setpoint, offset = ground_course(
         -cfg.back_speed_m_s, port, up, place.axis_yaw_rad, 0.0, senses, current_m_s, reach_m_s
     )
     return Steering(setpoint, offset_rad=offset)
 
 
-def _ground_course(
+def ground_course(
     forward_m_s: float,
     port_m_s: float,
     up_m_s: float,

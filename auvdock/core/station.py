@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from auvdock.assets import asset
 from auvdock.core.beacons import BeaconCfg, BeaconLayout, ring_layout
 from auvdock.core.errors import ConfigError
+from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.strict import load_toml
 
 __all__ = ["ConicalStationCfg", "FunnelCfg", "LatchCfg", "conical_layout", "load_conical_station"]
@@ -75,6 +76,8 @@ class ConicalStationCfg:
     """Electrical (paper A's table 2 is lost; paper B, figure 4, tests 10 W)."""
     beacons: tuple[BeaconCfg, ...] = ()
     """The station's other lights, or all of them when array_count is 0."""
+    rotating: RotatingBeaconCfg | None = None
+    """Paper B's rotating beacon, if the station carries one; no part of `layout`, whose lights stand still."""
 
     @property
     def layout(self) -> BeaconLayout:

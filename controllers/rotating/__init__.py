@@ -1,0 +1,1 @@
+"""Docking with a rotating beacon: from any side, around the station, into the cone of the fixed lamps."""
