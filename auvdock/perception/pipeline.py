@@ -18,7 +18,7 @@ from auvdock.perception.prior import AttitudePrior
 from auvdock.perception.spatiotemporal import SpatiotemporalAssociation
 from auvdock.perception.tracker import LightTracker, TrackerCfg
 
-__all__ = ["ASSOCIATIONS", "BeaconPerception", "PerceptionCfg"]
+__all__ = ["ASSOCIATIONS", "BeaconPerception", "PerceptionCfg", "track_views"]
 
 ASSOCIATIONS = ("spatiotemporal", "hungarian_ransac")
 """Ways to tell which light is which beacon."""
@@ -91,11 +91,12 @@ class BeaconPerception:
             entrance=entrance,
             array_count=associated.array_count,
             detections=detections,
-            tracks=_views(tracks),
+            tracks=track_views(tracks),
         )
 
 
-def _views(tracks: LightTracker) -> tuple[TrackView, ...]:
+def track_views(tracks: LightTracker) -> tuple[TrackView, ...]:
+    """The tracks as others may see them."""
     centres = tracks.state[:, :2].copy()
     rows = zip(
         tracks.track_id.tolist(),

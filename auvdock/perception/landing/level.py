@@ -1,0 +1,177 @@
+"""Pose of one level: weighted least squares on pixels, the vehicle's own attitude as a prior, and its covariance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from auvdock.core.arrays import Array
+from auvdock.core.camera import Camera
+from auvdock.core.contracts import PoseEstimate
+from auvdock.core.transforms import make_transform
+from auvdock.perception.landing.config import AttitudeCfg
+
+__all__ = ["LevelPose", "LevelSolver", "pose_offset", "rotated"]
+
+_MAX_ITERATIONS = 20
+_NO_ROTATION = np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class LevelPose:
+    """What one level makes of one frame.
+
+    Errors e = (δp, δθ) are those of `PoseEstimate`: position in the station frame, small rotation in the camera frame,
+    R = R₀ exp([δθ]).
+
+    Attributes:
+        estimate: pose and covariance, the attitude prior included.
+        information: (6, 6) H = JᵀWJ of the pixels alone.
+        pull: (6,) where the pixels alone would have the minimum, relative to the pose: the prior keeps the pose off it.
+        prior: (6, 6) information Λ of the attitude prior.
+        residual_sigmas: (n,) distance of each point from its reprojection over its σ.
+        cost: χ² of the reprojection and of the prior.
+    """
+
+    estimate: PoseEstimate
+    information: Array
+    pull: Array
+    prior: Array
+    residual_sigmas: Array
+    cost: float
+
+    @property
+    def T_station_camera(self) -> Array:
+        """(4, 4) the pose."""
+        return self.estimate.T_station_camera
+
+
+class LevelSolver:
+    """Levenberg–Marquardt over (position, rotation) for one camera.
+
+    χ² = Σ |u_i - π(Rᵀ (X_i - p))|² / σ_i² + φᵀ Λ φ with φ = log(R_mᵀ R) the rotation from the measured attitude R_m:
+    the inclinometer is known to some tenths of a degree, the compass about the station's vertical only roughly.
+    """
+
+    def __init__(self, cfg: AttitudeCfg, camera: Camera) -> None:
+        """Keep what every solve needs."""
+        self._matrix = np.ascontiguousarray(camera.matrix)
+        self._distortion = np.ascontiguousarray(camera.distortion)
+        self._tilt = 1.0 / (math.radians(cfg.tilt_noise_deg) ** 2 + math.radians(cfg.tilt_bias_deg) ** 2)
+        self._heading = 1.0 / math.radians(cfg.heading_deg) ** 2
+
+    def solve(
+        self,
+        points_m: Array,
+        pixels: Array,
+        sigma_px: Array,
+        attitude: Array,
+        start: Array,
+        ids: tuple[int, ...],
+        solver: str,
+    ) -> LevelPose | None:
+        """The pose of n ≥ 3 points, None where there is none in front of the camera.
+
+        Args:
+            points_m: (n, 3) points in the station frame.
+            pixels: (n, 2) their images.
+            sigma_px: (n,) standard deviation of each, per axis.
+            attitude: (3, 3) R_station_camera by inclinometer and compass.
+            start: (4, 4) T_station_camera to start from.
+            ids: for the estimate.
+            solver: name of what gave the start, for the estimate.
+        """
+        position, rotation = start[:3, 3].copy(), start[:3, :3].copy()
+        damping, best = 0.0, math.inf
+        kept: tuple[Array, Array, Array, Array, Array, Array] | None = None
+        trial = (position, rotation)
+        for _ in range(_MAX_ITERATIONS):
+            evaluated = self._evaluate(points_m, pixels, sigma_px, attitude, *trial)
+            if evaluated is not None and evaluated[0] <= best:
+                done = best - evaluated[0] < 1e-9 * (1.0 + best)
+                best, (position, rotation), kept, damping = evaluated[0], trial, evaluated[1:], damping * 0.1
+                if done:
+                    break
+            elif kept is None:
+                return None
+            else:
+                damping = max(10.0 * damping, 1e-3)
+            normal, gradient = kept[0] + kept[2], kept[1] + kept[3]
+            damped = normal + np.diag(damping * normal.diagonal())
+            try:
+                step: Array = -np.linalg.solve(damped, gradient).astype(np.float64)
+            except np.linalg.LinAlgError:
+                return None
+            if float(step @ normal @ step) < 1e-12:
+                break
+            trial = (position + step[:3], rotated(rotation, step[3:]))
+        if kept is None:
+            return None
+        return self._finish(kept, best, make_transform(rotation, position), sigma_px, ids, solver)
+
+    @staticmethod
+    def _finish(
+        kept: tuple[Array, Array, Array, Array, Array, Array],
+        cost: float,
+        T_station_camera: Array,
+        sigma_px: Array,
+        ids: tuple[int, ...],
+        solver: str,
+    ) -> LevelPose | None:
+        information, gradient, prior, _, residual, _ = kept
+        try:
+            covariance = np.linalg.inv(information + prior)
+            # Three points may leave a direction open: a trace of information keeps the inverse finite.
+            pull = -np.linalg.solve(information + 1e-9 * np.trace(information) / 6.0 * np.eye(6), gradient)
+        except np.linalg.LinAlgError:
+            return None
+        covariance = 0.5 * (covariance + covariance.T)
+        estimate = PoseEstimate(T_station_camera, covariance, ids, solver, float(residual.mean()))
+        return LevelPose(estimate, information, pull, prior, residual / sigma_px, cost)
+
+    def _evaluate(
+        self, points: Array, pixels: Array, sigma: Array, attitude: Array, position: Array, rotation: Array
+    ) -> tuple[float, Array, Array, Array, Array, Array, Array] | None:
+        """(χ², H, gradient of the pixels, Λ, gradient of the prior, residual_px, φ)."""
+        q = (points - position) @ rotation
+        if not bool((q[:, 2] > 1e-3).all()):
+            return None
+        image, by_q = cv2.projectPoints(q, _NO_ROTATION, _NO_ROTATION, self._matrix, self._distortion)
+        difference = image.reshape(-1, 2) - pixels
+        n = len(q)
+        # du/dq of each point: with the identity as pose that is the derivative by the translation.
+        du = by_q[:, 3:6].reshape(n, 2, 3)
+        jacobian = np.empty((n, 2, 6))
+        jacobian[:, :, :3] = -du @ rotation.T
+        # q = Rᵀ (X - p), R → R exp([δθ]): dq = q × δθ.
+        jacobian[:, :, 3:] = np.cross(du, q[:, None, :])
+        flat = (jacobian / sigma[:, None, None]).reshape(2 * n, 6)
+        weighted = (difference / sigma[:, None]).reshape(-1)
+        information, gradient = flat.T @ flat, flat.T @ weighted
+        turn = pose_turn(attitude, rotation)
+        up = rotation[2]
+        prior = np.zeros((6, 6))
+        prior[3:, 3:] = self._tilt * np.eye(3) + (self._heading - self._tilt) * np.outer(up, up)
+        pulled = prior[:, 3:] @ turn
+        cost = float(weighted @ weighted) + float(turn @ pulled[3:])
+        if not math.isfinite(cost):
+            return None
+        return cost, information, gradient, prior, pulled, np.hypot(difference[:, 0], difference[:, 1]), turn
+
+
+def pose_turn(a: Array, b: Array) -> Array:
+    """(3,) rotation vector log(R_aᵀ R_b), in b's axes as in a's."""
+    return np.asarray(cv2.Rodrigues(a.T @ b)[0], dtype=np.float64).ravel()
+
+
+def pose_offset(a: Array, b: Array) -> Array:
+    """(6,) error coordinates of pose b (4, 4) about pose a (4, 4): (p_b - p_a, log(R_aᵀ R_b))."""
+    return np.concatenate([b[:3, 3] - a[:3, 3], pose_turn(a[:3, :3], b[:3, :3])])
+
+
+def rotated(rotation: Array, turn: Array) -> Array:
+    """(3, 3) R exp([turn])."""
+    return rotation @ np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)

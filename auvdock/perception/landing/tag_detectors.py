@@ -1,0 +1,168 @@
+"""Detectors of AprilTags (family 36h11) on frames, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from auvdock.core.arrays import Array, Image
+from auvdock.core.contracts import Frame, RegionOfInterest, TagDetection
+from auvdock.core.errors import ConfigError
+from auvdock.perception.landing.tag_edges import corners_from_lines, line_through, refined_corners
+
+__all__ = ["TAG_DETECTORS", "AprilTagDetector", "ContourTagDetector", "TagDetector", "make_tag_detector"]
+
+TAG_DETECTORS = ("apriltag", "contour")
+"""Names of the tag detectors."""
+_FAMILY = cv2.aruco.DICT_APRILTAG_36h11
+_CELLS = 8
+_CODE = 6
+_MIN_REGION_PX = 12
+_SMALL_PX = 160
+"""A region below this is enlarged twice before it is searched: cells of two pixels are not read reliably."""
+
+
+class TagDetector(Protocol):
+    """Finds tags in a frame."""
+
+    def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
+        """Detect in the whole frame, or only in the given regions when there are any."""
+        ...
+
+
+def make_tag_detector(name: str) -> TagDetector:
+    """A tag detector by name.
+
+    Raises:
+        ConfigError: no detector of that name.
+    """
+    if name == "apriltag":
+        return AprilTagDetector()
+    if name == "contour":
+        return ContourTagDetector()
+    raise ConfigError("perception.tag_detector", name, f"one of {', '.join(TAG_DETECTORS)}")
+
+
+class AprilTagDetector:
+    """OpenCV's detector of the family, with corners from lines through sub-pixel edges."""
+
+    def __init__(self) -> None:
+        """Set OpenCV's detector up."""
+        settings = cv2.aruco.DetectorParameters()
+        settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
+        settings.adaptiveThreshWinSizeMin, settings.adaptiveThreshWinSizeMax = 5, 45
+        settings.adaptiveThreshWinSizeStep = 20
+        # A tag in haze has little contrast: OpenCV's 7 levels would drown it.
+        settings.adaptiveThreshConstant = 3
+        settings.minMarkerPerimeterRate = 0.05
+        self._detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(_FAMILY), settings)
+
+    def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
+        """Detect in the whole frame, or only in the given regions when there are any."""
+        found: list[TagDetection] = []
+        for patch, origin, grey in _patches(frame, regions):
+            scale = 2.0 if min(patch.shape) < _SMALL_PX else 1.0
+            searched = cv2.resize(patch, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_CUBIC) if scale > 1.0 else patch
+            corners, ids, _ = self._detector.detectMarkers(searched)
+            # Without a tag `ids` is None, which OpenCV's stubs do not say; `corners` is then empty.
+            for index, quad in enumerate(corners):
+                # Pixel centres have integer coordinates, enlarged ones lie between.
+                rough = (np.asarray(quad, dtype=np.float64).reshape(4, 2) + 0.5) / scale - 0.5 + origin
+                refined = refined_corners(grey, rough, frame.camera)
+                if refined is not None:
+                    found.append(TagDetection(int(ids[index, 0]), *refined))
+        return tuple(found)
+
+
+class ContourTagDetector:
+    """Paper C's way: smoothing, Canny, contours, quadrilaterals, code; corners from lines through the contour."""
+
+    def __init__(self) -> None:
+        """Load the family."""
+        self._family = cv2.aruco.getPredefinedDictionary(_FAMILY)
+
+    def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
+        """Detect in the whole frame, or only in the given regions when there are any."""
+        found: dict[int, TagDetection] = {}
+        for patch, origin, _ in _patches(frame, regions):
+            smooth = np.asarray(cv2.medianBlur(cv2.GaussianBlur(patch, (3, 3), 0.0), 3), dtype=np.uint8)
+            high, _ = cv2.threshold(smooth, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+            edges = cv2.Canny(smooth, 0.4 * high, 0.8 * high)
+            contours, _ = cv2.findContours(edges, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+            for contour in contours:
+                quad = _quadrilateral(np.asarray(contour, dtype=np.int32))
+                if quad is None:
+                    continue
+                number = self._read(smooth, quad)
+                if number is None:
+                    continue
+                fitted = _fitted(np.asarray(contour).reshape(-1, 2) + origin, quad + origin, frame)
+                if fitted is not None:
+                    tag_id, turns = number
+                    found[tag_id] = TagDetection(tag_id, np.roll(fitted[0], turns, axis=0), fitted[1])
+        return tuple(found.values())
+
+    def _read(self, grey: Image, quad: Array) -> tuple[int, int] | None:
+        """(number, quarter turns) of the code within a quadrilateral, None if it is none of the family's."""
+        side = 6 * _CELLS
+        target = np.array([[0, 0], [side, 0], [side, side], [0, side]], dtype=np.float32) - 0.5
+        warp = cv2.getPerspectiveTransform(quad.astype(np.float32), target)
+        flat = cv2.warpPerspective(grey, warp, (side, side))
+        level, _ = cv2.threshold(flat, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+        cells = np.asarray(flat, dtype=np.float64).reshape(_CELLS, 6, _CELLS, 6)[:, 1:5, :, 1:5].mean(axis=(1, 3))
+        bits = (cells > level).astype(np.uint8)
+        border = np.concatenate([bits[0], bits[-1], bits[1:-1, 0], bits[1:-1, -1]])
+        if int(border.sum()) > 2:
+            return None
+        read, number, turns = self._family.identify(np.ascontiguousarray(bits[1 : 1 + _CODE, 1 : 1 + _CODE]), 0.6)
+        return (int(number), int(turns)) if read else None
+
+
+def _patches(frame: Frame, regions: Sequence[RegionOfInterest]) -> list[tuple[Image, Array, Image]]:
+    """(grey patch, (2,) its origin in the image, whole grey image) of each region."""
+    grey = np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+    if not regions:
+        return [(grey, np.zeros(2), grey)]
+    return [
+        (np.ascontiguousarray(grey[r.y0 : r.y1, r.x0 : r.x1]), np.array([float(r.x0), float(r.y0)]), grey)
+        for r in regions
+        if r.x1 - r.x0 >= _MIN_REGION_PX and r.y1 - r.y0 >= _MIN_REGION_PX
+    ]
+
+
+def _quadrilateral(contour: NDArray[np.int32]) -> Array | None:
+    """(4, 2) corners of a contour that is a convex quadrilateral, clockwise in the image; None if it is none."""
+    length = cv2.arcLength(contour, True)
+    if length < 4 * _CELLS:
+        return None
+    quad = cv2.approxPolyDP(contour, 0.04 * length, True)
+    if len(quad) != 4 or not cv2.isContourConvex(quad) or abs(cv2.contourArea(quad)) < _CELLS**2:
+        return None
+    corners = np.asarray(quad, dtype=np.float64).reshape(4, 2)
+    a, b = corners[1] - corners[0], corners[2] - corners[0]
+    return corners if a[0] * b[1] - a[1] * b[0] > 0.0 else corners[::-1].copy()
+
+
+def _fitted(contour: Array, quad: Array, frame: Frame) -> tuple[Array, float] | None:
+    """Corners where lines through the contour's sides meet, and their standard deviation; sides without their ends."""
+    lines: list[tuple[Array, Array]] = []
+    variance = 0.0
+    for side in range(4):
+        start, way = quad[side], quad[(side + 1) % 4] - quad[side]
+        square = float(way @ way)
+        share = (contour - start) @ way / square
+        gap = np.abs((contour - start) @ np.array([-way[1], way[0]])) / np.sqrt(square)
+        near = contour[(share > 0.1) & (share < 0.9) & (gap < 0.1 * np.sqrt(square) + 1.0)]
+        fitted = line_through(frame.camera.normalise(near.astype(np.float64)))
+        if fitted is None:
+            return None
+        lines.append(fitted[:2])
+        variance = max(variance, 4.0 * fitted[2] ** 2 / fitted[3])
+    corners = corners_from_lines(lines, frame.camera)
+    # A contour runs through whole pixels: its lines are no better than a third of one.
+    focal = float(frame.camera.matrix[0, 0])
+    return None if corners is None else (corners, float(np.hypot(0.3, focal * np.sqrt(variance))))
