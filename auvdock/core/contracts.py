@@ -270,7 +270,7 @@ class Proprioception:
         angular_velocity_rad_s: (3,) p, q, r in the body frame: gyroscopes.
         velocity_ground_m_s: (3,) velocity over ground in the body frame: DVL bottom lock.
         velocity_water_m_s: (3,) velocity through the water in the body frame: DVL water track.
-        contact: True while the bow's touch switch is pressed.
+        contact: True while the touch switch is pressed: the bow's, in landing the underside's.
         latched: True once the station has reported over its short link that the latch closed.
     """
 

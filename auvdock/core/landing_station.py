@@ -121,6 +121,11 @@ class LandingStationCfg:
                 raise ConfigError(f"station.{name}", getattr(self, name), "a length above 0 m")
 
     @property
+    def floor_below_m(self) -> float:
+        """Distance from the station frame's origin to the floor."""
+        return self.height_m
+
+    @property
     def layout(self) -> BeaconLayout:
         """All lights."""
         return BeaconLayout(self.beacons)

@@ -6,12 +6,11 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.marine import flip_vector
-from auvdock.core.station import ConicalStationCfg
 from auvdock.core.transforms import quat_wxyz_from_rotation
 from auvdock.core.vehicle import MountCfg, VehicleCfg
+from auvdock.sim.dock import Dock
 from auvdock.sim.hydrodynamics import GRAVITY_M_S2
 from auvdock.sim.mj import MjModel, mujoco
-from auvdock.sim.station_geometry import station_geoms
 
 __all__ = ["LATCH", "VEHICLE", "build_model", "scene_xml"]
 
@@ -22,21 +21,19 @@ LATCH = "latch"
 
 _CONTACT_TIME_S = 0.03
 """Time constant of contacts: over three physics steps at 120 Hz (MuJoCo asks for two), a polymer lining's give."""
-_LATCH_TIME_S = 0.1
-"""Time constant of the latch's hold: stops 0.5 m/s within some 5 cm, as a sprung pawl does."""
 _CAMERA_FOVY_DEG = 50.0
 """Of the named cameras, which are for looking at the scene; perception's camera brings its own intrinsics."""
 _FIN_SPAN_M = 0.055
 _FIN_CHORD_M = 0.075
 
 
-def build_model(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) -> MjModel:
+def build_model(vehicle: VehicleCfg, dock: Dock, dt_s: float) -> MjModel:
     """Compile the scene, with the contact solver told the vehicle's mass in water.
 
     MuJoCo scales a contact's softness by `body_invweight0`, taken from the dry mass; it is replaced by the same mean
     of M⁻¹'s diagonal with the added mass in it, so that contacts are as stiff as `solref` says.
     """
-    model = mujoco.MjModel.from_xml_string(scene_xml(vehicle, station, dt_s))
+    model = mujoco.MjModel.from_xml_string(scene_xml(vehicle, dock, dt_s))
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
     inverse = np.diag(np.linalg.inv(vehicle.rigid_body_mass_body + vehicle.added_mass_body))
     model.body_invweight0[body] = (inverse[:3].mean(), inverse[3:].mean())
@@ -47,14 +44,14 @@ def build_model(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) ->
     return model
 
 
-def scene_xml(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) -> str:
+def scene_xml(vehicle: VehicleCfg, dock: Dock, dt_s: float) -> str:
     """MJCF of the scene; every element is named.
 
     Dense Jacobian and Newton solver for this small model, whose single body needs no islands; automatic reset is off
     because a diverged state must be seen.
     """
-    geoms = "\n      ".join(station_geoms(station))
-    depth = station.depth_m
+    assets = "\n    ".join(dock.assets())
+    geoms = "\n      ".join(dock.geoms())
     return f"""
 <mujoco model="auvdock">
   <compiler angle="radian" autolimits="true"/>
@@ -63,7 +60,7 @@ def scene_xml(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) -> s
     <flag autoreset="disable" island="disable" eulerdamp="disable"/>
   </option>
   <size memory="4M"/>
-  <statistic center="0 0 {-depth:.9g}" extent="4"/>
+  <statistic center="0 0 {-dock.depth_m:.9g}" extent="4"/>
   <visual>
     <global offwidth="1920" offheight="1080"/>
     <quality offsamples="0" shadowsize="0"/>
@@ -83,20 +80,21 @@ def scene_xml(vehicle: VehicleCfg, station: ConicalStationCfg, dt_s: float) -> s
     <material name="fin" rgba="0.1 0.1 0.12 1" specular="0.1"/>
     <material name="lamp_blue" rgba="0.55 0.7 1 1" emission="1"/>
     <material name="lamp_red" rgba="1 0.35 0.25 1" emission="1"/>
+    {assets}
   </asset>
   <worldbody>
     <light name="sun" directional="true" pos="0 0 0" dir="0.2 0.1 -1" diffuse="0.5 0.5 0.5" castshadow="false"/>
       {geoms}
-    {_vehicle_body(vehicle, depth)}
+    {_vehicle_body(vehicle, dock.free_world_m)}
   </worldbody>
   <equality>
-    <weld name="{LATCH}" body1="{VEHICLE}" active="false" solref="{_LATCH_TIME_S} 1" solimp="0.9 0.95 0.01"/>
+    <weld name="{LATCH}" body1="{VEHICLE}" active="false" solref="{dock.latch_time_s} 1" solimp="0.9 0.95 0.01"/>
   </equality>
 </mujoco>
 """
 
 
-def _vehicle_body(vehicle: VehicleCfg, depth_m: float) -> str:
+def _vehicle_body(vehicle: VehicleCfg, position_m: tuple[float, float, float]) -> str:
     quat, moments = _principal_inertia(vehicle)
     radius = vehicle.radius_m
     nose, tail = vehicle.nose_x_m, vehicle.tail_x_m
@@ -108,11 +106,12 @@ def _vehicle_body(vehicle: VehicleCfg, depth_m: float) -> str:
         f'contype="0" conaffinity="0" mass="0"/>'
         for name, y, z in (("port", 1, 0), ("starboard", -1, 0), ("top", 0, 1), ("bottom", 0, -1))
     )
+    place = " ".join(f"{part:.9g}" for part in position_m)
     com = " ".join(f"{part:.12g}" for part in vehicle.centre_of_gravity_body_m)
     cameras = "\n      ".join(
         _camera(name, mount) for name, mount in (("bow", vehicle.bow_camera), ("belly", vehicle.belly_camera))
     )
-    return f"""<body name="{VEHICLE}" pos="10 0 {-depth_m:.9g}">
+    return f"""<body name="{VEHICLE}" pos="{place}">
       <freejoint name="vehicle_free"/>
       <inertial pos="{com}" mass="{vehicle.mass_kg:.12g}" quat="{quat}" diaginertia="{moments}"/>
       <geom name="hull" type="capsule" fromto="{tail + radius:.9g} 0 0 {nose - radius:.9g} 0 0" size="{radius:.9g}"

@@ -41,7 +41,7 @@ class SensorCfg:
     velocity_scale_error: float = 0.002
     """DVL scale error (same data sheet: ±0.2 %)."""
     contact_threshold_n: float = 5.0
-    """Force that closes the bow's touch switch."""
+    """Force that closes the touch switch: the bow's, in landing the underside's."""
 
     def __post_init__(self) -> None:
         """Refuse negative deviations."""
@@ -84,7 +84,7 @@ class Sensors:
         euler_zyx_rad: tuple[float, float, float],
         nu_body: Array,
         nu_relative_body: Array,
-        bow_force_n: float,
+        switch_force_n: float,
         latched: bool,
     ) -> Proprioception:
         """One sample of all sensors."""
@@ -98,6 +98,6 @@ class Sensors:
             angular_velocity_rad_s=nu_body[3:] + error[4:7],
             velocity_ground_m_s=self._scale * nu_body[:3] + error[7:10],
             velocity_water_m_s=self._scale * nu_relative_body[:3] + error[10:13],
-            contact=bow_force_n > self._cfg.contact_threshold_n,
+            contact=switch_force_n > self._cfg.contact_threshold_n,
             latched=latched,
         )

@@ -13,13 +13,14 @@ import numpy as np
 from auvdock.core.arrays import Array, check_shape
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import ConfigError
-from auvdock.core.station import ConicalStationCfg
+from auvdock.core.stations import StationCfg
 from auvdock.core.transforms import euler_zyx_from_rotation, make_transform
 from auvdock.core.vehicle import VehicleCfg, load_vehicle
 from auvdock.sim.actuation import Actuators
 from auvdock.sim.contacts import Contacts
+from auvdock.sim.dock import Weld
+from auvdock.sim.docks import make_dock
 from auvdock.sim.hydrodynamics import Hydrodynamics
-from auvdock.sim.latch import Latch
 from auvdock.sim.mj import MjData, mujoco
 from auvdock.sim.ocean import CurrentCfg, Ocean
 from auvdock.sim.scene import LATCH, VEHICLE, build_model
@@ -77,7 +78,7 @@ class Simulator:
         history: ring buffer of the last steps.
     """
 
-    def __init__(self, cfg: SimCfg, station: ConicalStationCfg, vehicle: VehicleCfg | None = None) -> None:
+    def __init__(self, cfg: SimCfg, station: StationCfg, vehicle: VehicleCfg | None = None) -> None:
         """Build the world.
 
         Args:
@@ -92,7 +93,8 @@ class Simulator:
         self.station = station
         self.vehicle = vehicle if vehicle is not None else load_vehicle(cfg.vehicle)
         self._dt_s = 1.0 / cfg.physics_hz
-        self.model = build_model(self.vehicle, station, self._dt_s)
+        self._dock = make_dock(station, self.vehicle)
+        self.model = build_model(self.vehicle, self._dock, self._dt_s)
         self._data = mujoco.MjData(self.model)
         self.T_world_station = make_transform(np.eye(3), np.array([0.0, 0.0, -station.depth_m]))
         self.history: deque[HistoryEntry] = deque(maxlen=_HISTORY_STEPS)
@@ -100,13 +102,12 @@ class Simulator:
         self._hydrodynamics = Hydrodynamics(self.vehicle, self._actuators.thrusters)
         self._ocean = Ocean(cfg.current, station.depth_m, self._dt_s)
         self._sensors = Sensors(cfg.sensors)
-        self._latch = Latch(station.latch, station.funnel)
         self._contacts = Contacts(self.model, self._data, self.vehicle.nose_x_m, self.vehicle.radius_m)
         self._weld = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_EQUALITY, LATCH)
         self._body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
         self._truth: Truth | None = None
         self._bind()
-        self.reset(np.array([10.0, 0.0, -station.depth_m]), np.array([0.0, 0.0, 0.0, 1.0]), np.random.default_rng(0))
+        self.reset(np.array(self._dock.free_world_m), np.array([0.0, 0.0, 0.0, 1.0]), np.random.default_rng(0))
 
     def _bind(self) -> None:
         """Views into MuJoCo's memory, so that the step need not look them up."""
@@ -172,7 +173,7 @@ class Simulator:
         self._ocean.reset(current if current is not None else self.cfg.current, water_rng)
         self._sensors.reset(sensor_rng)
         self._actuators.reset()
-        self._latch.reset()
+        self._dock.reset()
         self._qpos[:] = qpos
         rotation = np.array(rotation_rows(*qpos[3:])).reshape(3, 3)
         self._qvel[:3] = np.array(self._ocean.velocity(qpos[2])) + rotation @ nu[:3]
@@ -236,8 +237,9 @@ class Simulator:
         if self._truth is not None:
             return self._truth
         rotation, nu, nu_relative, water = self._motion()
-        entry = self._latch.entry
-        pose, nose = make_transform(rotation, self._qpos[:3]), np.array(self._nose_m)
+        dock = self._dock.report()
+        entry = dock.entry
+        pose, nose = make_transform(rotation, self._qpos[:3]), np.array(dock.nose_station_m)
         for array in (pose, nose, nu, nu_relative, water):
             array.flags.writeable = False
         self._truth = Truth(
@@ -247,12 +249,12 @@ class Simulator:
             nu_relative_body=nu_relative,
             current_world_m_s=water,
             nose_station_m=nose,
-            axis_angle_rad=self._axis_angle_rad,
+            axis_angle_rad=dock.axis_angle_rad,
             contact_force_n=self._contacts.force_n,
             peak_contact_force_n=self._contacts.peak_force_n,
             touching_station=self._contacts.touching_station,
-            latched=self._latch.closed_at_s is not None,
-            docked=self._latch.docked,
+            latched=dock.latched,
+            docked=dock.docked,
             entry_speed_m_s=entry.speed_m_s if entry else None,
             entry_angle_rad=entry.angle_rad if entry else None,
             entry_lateral_m=entry.lateral_m if entry else None,
@@ -260,6 +262,7 @@ class Simulator:
             energy_j=self._energy_j,
             path_length_m=self._path_length_m,
             diverged=self._diverged,
+            landing=dock.landing,
         )
         return self._truth
 
@@ -272,8 +275,8 @@ class Simulator:
             euler_zyx_rad=euler_zyx_from_rotation(rotation),
             nu_body=nu,
             nu_relative_body=nu_relative,
-            bow_force_n=self._contacts.bow_force_n(self._qpos[:3], rotation[:, 0]),
-            latched=self._latch.closed_at_s is not None,
+            switch_force_n=self._dock.switch_force_n(self._contacts, self._qpos[:3], rotation),
+            latched=self._dock.latched,
         )
 
     def _motion(self) -> tuple[Array, Array, Array, Array]:
@@ -286,7 +289,7 @@ class Simulator:
         return rotation, nu, nu_relative, water
 
     def _observe(self) -> None:
-        """Nose, latch and divergence after a step or a reset."""
+        """Dock, latch and divergence after a step or a reset."""
         self._truth = None
         qpos: list[float] = self._qpos.tolist()
         qvel: list[float] = self._qvel.tolist()
@@ -295,15 +298,9 @@ class Simulator:
             self._freeze()
             return
         self._sane = qpos, qvel
-        r00, r01, r02, r10, _, _, r20, _, _ = rotation_rows(*qpos[3:7])
-        reach = self.vehicle.nose_x_m
-        nose = qpos[0] + reach * r00, qpos[1] + reach * r10, qpos[2] + reach * r20 + self.station.depth_m
-        # The tube points along −x of the station frame, which is not turned against the world.
-        angle = math.atan2(math.hypot(r10, r20), -r00)
-        self._nose_m, self._axis_angle_rad = nose, angle
-        inward = -(qvel[0] + reach * (r01 * qvel[5] - r02 * qvel[4]))
-        if self._latch.update(self.time_s, nose, inward, angle):
-            self._close_latch(qpos)
+        weld = self._dock.update(self.time_s, qpos, qvel, self._contacts)
+        if weld is not None:
+            self._close_latch(weld)
 
     def _freeze(self) -> None:
         """Mark as diverged and go back to the last sane state, so that nobody downstream meets a NaN."""
@@ -312,14 +309,12 @@ class Simulator:
         self._qpos[:], self._qvel[:] = self._sane
         self._contacts.force_n = 0.0
 
-    def _close_latch(self, qpos: list[float]) -> None:
-        """Weld the body where it is, at the nose, as a pawl behind the bow would."""
-        reach = self.vehicle.nose_x_m
-        x, y, z = self._nose_m
-        weld = self.model.eq_data[self._weld]
-        weld[0:3] = x, y, z - self.station.depth_m
-        weld[3:6] = reach, 0.0, 0.0
-        w, qx, qy, qz = qpos[3:7]
-        weld[6:10] = w, -qx, -qy, -qz
-        weld[10] = 1.0
+    def _close_latch(self, weld: Weld) -> None:
+        """Switch MuJoCo's weld on; it takes the pose of the world in the body's frame."""
+        data = self.model.eq_data[self._weld]
+        data[0:3] = weld.anchor_world_m
+        data[3:6] = weld.anchor_body_m
+        w, x, y, z = weld.quat_wxyz
+        data[6:10] = w, -x, -y, -z
+        data[10] = 1.0
         self._data.eq_active[self._weld] = 1

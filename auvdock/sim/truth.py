@@ -4,9 +4,34 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from auvdock.core.arrays import Array
 
-__all__ = ["Truth"]
+__all__ = ["LandingTruth", "Truth"]
+
+
+@dataclass(frozen=True, eq=False)
+class LandingTruth:
+    """How the vehicle stands to a landing station. "Seat" is `VehicleCfg.seat_m`, which comes to rest in the guides.
+
+    Attributes:
+        seat_error_m: (3,) seat less its place in the guides, station frame: along (to the head), across (to port), up.
+        heading_error_rad: heading of the vehicle less that of the station's centre line, positive to port.
+        tilt_rad: angle between the vehicle's z and the world's.
+        touchdown_speed_m_s: downward speed of the seat at the first contact with the station; None before. Negative if
+            it was rising.
+        touchdown_time_s: when that was; None before.
+        touchdown_force_n: greatest force of the station on the vehicle from the first contact until the latch closed,
+            or so far; None before.
+    """
+
+    seat_error_m: Array
+    heading_error_rad: float
+    tilt_rad: float
+    touchdown_speed_m_s: float | None
+    touchdown_time_s: float | None
+    touchdown_force_n: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,13 +45,15 @@ class Truth:
         nu_relative_body: (6,) the same relative to the water.
         current_world_m_s: (3,) velocity of the water at the vehicle.
         nose_station_m: (3,) tip of the nose in the station frame.
-        axis_angle_rad: angle between the hull's axis and the tube's, 0 when pointing straight in.
+        axis_angle_rad: angle between the hull's axis and the tube's, 0 when pointing straight in; in landing, between
+            the hull's axis and the station's centre line.
         contact_force_n: magnitude of the net force of contacts and latch on the hull, mean over the last step.
         peak_contact_force_n: the greatest so far.
         touching_station: True while any part of the hull touches the station.
         latched: True once the latch has closed.
-        docked: True once the latch has held for `hold_s` and the entry kept `LatchCfg`'s limits.
-        entry_speed_m_s: speed along the tube as the nose last passed the throat inwards; None before.
+        docked: True once the latch has held for `hold_s` and the entry kept `LatchCfg`'s limits (in landing: the
+            touchdown those of `LandingLatchCfg`).
+        entry_speed_m_s: speed along the tube as the nose last passed the throat inwards; None before, and in landing.
         entry_angle_rad: `axis_angle_rad` at that moment; None before.
         entry_lateral_m: sideways offset of the nose from the tube's axis at that moment, + to the right as the
             entering vehicle sees it; None before.
@@ -34,6 +61,7 @@ class Truth:
         energy_j: hydraulic work of the thrusters so far (`Actuators.power_w`).
         path_length_m: distance over ground so far.
         diverged: True once the state was not finite or absurd; the state then stays frozen.
+        landing: how the vehicle stands to a landing station; None at a conical one.
     """
 
     time_s: float
@@ -55,3 +83,11 @@ class Truth:
     energy_j: float
     path_length_m: float
     diverged: bool
+    landing: LandingTruth | None = None
+
+    @property
+    def to_go_m(self) -> float:
+        """Distance yet to go: of the nose to the mouth's plane, negative inside; in landing, of the seat to its place."""
+        if self.landing is not None:
+            return float(np.linalg.norm(self.landing.seat_error_m))
+        return float(self.nose_station_m[0])

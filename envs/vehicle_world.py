@@ -1,0 +1,228 @@
+"""What every docking world shares: simulator and camera behind one reset, step and sense. No controller inside."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from auvdock.assets import asset_names
+from auvdock.core.arrays import Array
+from auvdock.core.camera import Camera, CameraCfg, make_camera
+from auvdock.core.contracts import Detections, Frame, Proprioception, TagDetection
+from auvdock.core.errors import ConfigError
+from auvdock.core.marine import flip_vector
+from auvdock.core.stations import StationCfg
+from auvdock.core.strict import load_toml
+from auvdock.core.vehicle import MountCfg
+from auvdock.envs.config import LimitsCfg
+from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
+from auvdock.optics.water import load_water, with_attenuation
+from auvdock.sim.ocean import CurrentCfg
+from auvdock.sim.simulator import SimCfg, Simulator
+from auvdock.sim.truth import Truth
+
+__all__ = ["Sensed", "Start", "VehicleWorld", "WorldSettings", "detection_model", "mounted_camera"]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What the vehicle can know at one moment.
+
+    Attributes:
+        proprioception: its own sensors.
+        frame: a new camera frame, None between frames or where `detections` stands in for it.
+        detections: in the `beacons` fidelity, the detections of a new frame, else None.
+        tags: in the `beacons` fidelity of a landing, the tags seen in that frame.
+    """
+
+    proprioception: Proprioception
+    frame: Frame | None
+    detections: Detections | None
+    tags: tuple[TagDetection, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """How an episode starts.
+
+    Attributes:
+        position_m: (3,) of the body in the world.
+        quat_wxyz: (4,) attitude.
+        current: the water's motion in this episode.
+    """
+
+    position_m: Array
+    quat_wxyz: Array
+    current: CurrentCfg
+
+
+class WorldSettings(Protocol):
+    """What the configurations of all worlds have in common."""
+
+    @property
+    def water(self) -> str:
+        """Water preset."""
+        ...
+
+    @property
+    def attenuation_per_m(self) -> float | None:
+        """Beam attenuation in place of the preset's."""
+        ...
+
+    @property
+    def sim(self) -> SimCfg:
+        """Vehicle, current, sensors, physics rate."""
+        ...
+
+    @property
+    def camera(self) -> CameraCfg:
+        """The camera that the pilot looks through."""
+        ...
+
+    @property
+    def limits(self) -> LimitsCfg:
+        """What ends an episode without success."""
+        ...
+
+    @property
+    def control_hz(self) -> float:
+        """Commands a second."""
+        ...
+
+
+class VehicleWorld(ABC):
+    """A vehicle, a station, the water between them and a camera.
+
+    Randomness is split by purpose: start pose and current, physics and sensors, camera. Changing what one of them
+    draws leaves the others as they were. A world for another kind of docking says where it starts and how it looks.
+
+    Attributes:
+        simulator: the truth.
+        camera: the camera that the pilot looks through.
+        water: the water.
+    """
+
+    def __init__(self, cfg: WorldSettings, station: StationCfg, mount: str) -> None:
+        """Build simulator, camera and water.
+
+        Args:
+            cfg: the world.
+            station: its station.
+            mount: "bow" or "belly", the place of the pilot's camera.
+
+        Raises:
+            ConfigError: a preset that does not exist or a value that does not fit.
+        """
+        self.simulator = Simulator(cfg.sim, station)
+        vehicle = self.simulator.vehicle
+        self.camera = mounted_camera(cfg.camera, vehicle.bow_camera if mount == "bow" else vehicle.belly_camera)
+        self.water = load_water(cfg.water)
+        if cfg.attenuation_per_m is not None:
+            self.water = with_attenuation(self.water, cfg.attenuation_per_m)
+        self._limits, self._hold_s, self._control_s = cfg.limits, station.latch.hold_s, 1.0 / cfg.control_hz
+        self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)
+        self._steps_per_frame = round(cfg.sim.physics_hz / cfg.camera.rate_hz)
+        self._step_count = 0
+        self._last_frame_step = -1
+        self._latched_at_s: float | None = None
+        self._truth: Truth | None = None
+
+    @abstractmethod
+    def _draw_start(self, rng: np.random.Generator) -> Start:
+        """Draw an episode's start."""
+
+    @abstractmethod
+    def _reset_camera(self, rng: np.random.Generator) -> None:
+        """Start an episode's optics."""
+
+    @abstractmethod
+    def _look(self, truth: Truth, proprioception: Proprioception) -> Sensed:
+        """Take a frame, or what stands in for it."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release the renderer."""
+
+    def reset(self, seed: int) -> None:
+        """Start a new episode; the seed alone decides everything that is drawn in it."""
+        start, physics, camera = (np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
+        drawn = self._draw_start(start)
+        self.simulator.reset(drawn.position_m, drawn.quat_wxyz, physics, current=drawn.current)
+        self._reset_camera(camera)
+        self._step_count = 0
+        self._last_frame_step = -self._steps_per_frame
+        self._latched_at_s = None
+        self._truth = None
+
+    def step(self, values: Array) -> None:
+        """Apply actuator commands (n,) in [-1, 1] for one control period."""
+        for _ in range(self._steps_per_control):
+            self.simulator.step(values)
+        self._step_count += self._steps_per_control
+        self._truth = None
+        if self._latched_at_s is None and self.truth.latched:
+            self._latched_at_s = self.truth.time_s
+
+    def sense(self) -> Sensed:
+        """Sample the sensors now; once per control period."""
+        proprioception = self.simulator.proprioception()
+        if self._step_count - self._last_frame_step < self._steps_per_frame:
+            return Sensed(proprioception, None, None)
+        self._last_frame_step = self._step_count
+        return self._look(self.truth, proprioception)
+
+    @property
+    def truth(self) -> Truth:
+        """The simulator's state, for metrics and rewards; read once a control period, however often it is asked for."""
+        if self._truth is None:
+            self._truth = self.simulator.truth
+        return self._truth
+
+    @property
+    def end(self) -> str | None:
+        """Why the episode is over, apart from success and the pilot's own decision: a failure reason, or None."""
+        truth = self.truth
+        if truth.diverged:
+            return "diverged"
+        if truth.peak_contact_force_n > self._limits.collision_force_n:
+            return "collision"
+        if self._latched_at_s is not None and not truth.docked:
+            held_s = truth.time_s - self._latched_at_s
+            if held_s > self._hold_s + self._control_s:
+                return "terminal"  # held, but entered too fast or too far askew: that will not change any more
+        if truth.time_s >= self._limits.max_time_s - 1e-9:
+            return "timeout"
+        return None
+
+    @property
+    def is_success(self) -> bool:
+        """Latched, held, and within the limits of the station's latch."""
+        return self.truth.docked
+
+
+def detection_model(path: str | None, detector: str) -> DetectionModelCfg:
+    """The fitted behaviour that the `beacons` fidelity draws from: of a file, or the detector's own.
+
+    Raises:
+        ConfigError: nothing was fitted for that detector.
+    """
+    if path is not None:
+        return load_toml(DetectionModelCfg, Path(path))
+    if detector not in asset_names("detection"):
+        remedy = "world.detection_model a file that `auvdock fit-detector` wrote for it, or fidelity 'pixels'"
+        raise ConfigError("detector", detector, f"{remedy}: the beacons fidelity knows only fitted detectors")
+    return load_detection_model(detector)
+
+
+def mounted_camera(cfg: CameraCfg, mount: MountCfg) -> Camera:
+    """A camera where the vehicle's data puts it."""
+    return make_camera(
+        cfg,
+        flip_vector(np.array(mount.position_m)),
+        flip_vector(np.array(mount.direction)),
+        flip_vector(np.array(mount.up)),
+    )
