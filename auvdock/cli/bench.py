@@ -85,7 +85,7 @@ def _physics() -> dict[str, Any]:
     step_s = _seconds_per_call(lambda: world.simulator.step(command), 1000)
     data = mujoco.MjData(world.simulator.model)
     bare_s = _seconds_per_call(lambda: mujoco.mj_step(world.simulator.model, data), 1000)
-    rate_hz = world.cfg.sim.physics_hz
+    rate_hz = world.simulator.cfg.physics_hz
     return {
         "steps_per_s": 1.0 / step_s,
         "step_us": step_s * 1e6,

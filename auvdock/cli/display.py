@@ -40,7 +40,7 @@ class ProgressDisplay:
 
     def on_tick(self, tick: Tick) -> None:
         """Update the line."""
-        range_m = float(tick.truth.nose_station_m[0])
+        range_m = tick.truth.to_go_m
         if self._start_range_m is None:
             self._start_range_m = range_m
         speed_m_s = math.hypot(*(float(part) for part in tick.truth.nu_body[:3]))

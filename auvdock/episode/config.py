@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from auvdock.assets import asset
 from auvdock.controllers.pilot import ControlCfg
@@ -13,7 +13,7 @@ from auvdock.core.strict import merge, read_toml
 from auvdock.envs.config import WorldCfg
 from auvdock.perception.pipeline import PerceptionCfg
 
-__all__ = ["LEVELS", "EpisodeCfg", "level_cfg"]
+__all__ = ["LEVELS", "AnyEpisodeCfg", "EpisodeCfg", "level_cfg"]
 
 LEVELS = (0, 1, 2, 3, 4)
 """Difficulty levels; `assets/levels/level_N.toml` says what each changes."""
@@ -34,6 +34,10 @@ class EpisodeCfg:
             ConfigError: an unknown key or a value that does not fit.
         """
         return merge(self, changes)
+
+
+AnyEpisodeCfg: TypeAlias = EpisodeCfg
+"""Configuration of an episode of any kind of docking."""
 
 
 def level_cfg(level: int) -> EpisodeCfg:

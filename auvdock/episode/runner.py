@@ -10,22 +10,16 @@ from importlib.metadata import version
 import cv2
 import numpy as np
 
-from auvdock.controllers.pilot import ConicalPilot
 from auvdock.core.contracts import Percept
 from auvdock.core.strict import to_plain
-from auvdock.envs.world import DockingWorld, Sensed
-from auvdock.episode.config import EpisodeCfg
-from auvdock.episode.metrics import GuidanceMetrics
+from auvdock.envs.vehicle_world import Sensed
+from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.episode.result import EpisodeResult
+from auvdock.episode.task import TaskMetrics, make_task
 from auvdock.episode.trace import EpisodeObserver, EpisodeSetup, Tick
-from auvdock.perception.detectors import make_detector
-from auvdock.perception.pipeline import BeaconPerception
 from auvdock.sim.mj import mujoco
 
 __all__ = ["EpisodeRunner", "software_versions"]
-
-_STAGES = {"acquire": "search", "abort": "timeout", "docked": "terminal"}
-"""Guidance modes whose failure cause has another name."""
 
 
 def software_versions() -> dict[str, str]:
@@ -42,33 +36,22 @@ def software_versions() -> dict[str, str]:
 class EpisodeRunner:
     """Runs episodes of one configuration; reusable, since building the world costs more than resetting it."""
 
-    def __init__(self, cfg: EpisodeCfg) -> None:
+    def __init__(self, cfg: AnyEpisodeCfg) -> None:
         """Build world, detector, perception and pilot.
 
         Raises:
             ConfigError: a name that does not exist or a value that does not fit.
         """
         self.cfg = cfg
-        self.detector = make_detector(cfg.perception.detector)
-        self.world = DockingWorld(cfg.world, cfg.perception.detector)
-        self.perception = BeaconPerception(cfg.perception, self.world.camera, cfg.world.station.layout)
-        self.pilot = ConicalPilot(
-            cfg.control,
-            self.world.simulator.vehicle,
-            cfg.world.station,
-            self.world.camera,
-            1.0 / cfg.world.control_hz,
-        )
+        self.task = make_task(cfg)
+        self.world = self.task.world
+        self.pilot = self.task.pilot
         self._plain_config = to_plain(cfg)
         self._versions = software_versions()
 
     def perceive(self, sensed: Sensed) -> Percept | None:
         """Perception's answer to what was sensed; None if there was no new frame."""
-        if sensed.frame is not None:
-            return self.perception.update(self.detector.detect(sensed.frame), sensed.proprioception)
-        if sensed.detections is not None:
-            return self.perception.update(sensed.detections, sensed.proprioception)
-        return None
+        return self.task.perceive(sensed)
 
     def run(self, seed: int, observers: Sequence[EpisodeObserver] = ()) -> EpisodeResult:
         """Run one episode to its end.
@@ -77,7 +60,7 @@ class EpisodeRunner:
         the interrupt goes on to the caller.
         """
         started = time.perf_counter()
-        metrics = GuidanceMetrics(self.world.camera, self.cfg.world.station, self.world.simulator.T_world_station)
+        metrics = self.task.metrics()
         setup = self._setup(seed)
         flight = _Flight()
         try:
@@ -85,8 +68,7 @@ class EpisodeRunner:
                 observer.on_start(setup)
             try:
                 for tick in self._ticks(seed, flight):
-                    if tick.percept is not None:
-                        metrics.add(tick.truth, tick.percept)
+                    metrics.add(tick)
                     for observer in observers:
                         observer.on_tick(tick)
             except KeyboardInterrupt:
@@ -101,7 +83,7 @@ class EpisodeRunner:
     def _ticks(self, seed: int, flight: _Flight) -> Iterator[Tick]:
         world = self.world
         world.reset(seed)
-        self.perception.reset()
+        self.task.reset()
         state = self.pilot.initial_state()
         while True:
             sensed = world.sense()
@@ -111,26 +93,25 @@ class EpisodeRunner:
             image = sensed.frame.image if sensed.frame is not None else None
             yield Tick(world.truth, sensed.proprioception, image, percept, command)
             if command.giving_up:
-                flight.failure_reason = _STAGES.get(flight.stage, flight.stage)
+                flight.failure_reason = self.task.stage(flight.stage)
                 return
             world.step(command.values)
             if world.is_success:
                 return
             end = world.end
             if end is not None:
-                stage = _STAGES.get(flight.mode, flight.mode)
-                flight.failure_reason = stage if end == "timeout" else end
+                flight.failure_reason = self.task.stage(flight.mode) if end == "timeout" else end
                 return
 
     def _setup(self, seed: int) -> EpisodeSetup:
         world = self.world
         return EpisodeSetup(
-            title=f"conical station, seed {seed}, {self.cfg.world.fidelity}",
-            station=self.cfg.world.station,
+            title=f"{self.task.name}, seed {seed}, {self.cfg.world.fidelity}",
+            station=self.task.station,
             vehicle=world.simulator.vehicle,
             camera=world.camera,
             T_world_station=world.simulator.T_world_station,
-            detector=self.cfg.perception.detector,
+            detector=self.task.detector,
             water=world.water.name,
         )
 
@@ -140,33 +121,23 @@ class EpisodeRunner:
             observer.on_end(result)
         return result
 
-    def _result(self, seed: int, metrics: GuidanceMetrics, flight: _Flight, started: float) -> EpisodeResult:
+    def _result(self, seed: int, metrics: TaskMetrics, flight: _Flight, started: float) -> EpisodeResult:
         truth = self.world.truth
-        guidance = metrics.summary()
         wall_s = time.perf_counter() - started
         return EpisodeResult(
             success=self.world.is_success and flight.failure_reason is None,
             failure_reason=flight.failure_reason,
-            distortion_rate=guidance.distortion_rate,
-            precise_frames=guidance.precise_frames,
-            invalid_frames=guidance.invalid_frames,
-            entry_distance_m=guidance.entry_distance_m,
-            precise_range_m=guidance.precise_range_m,
             time_s=truth.time_s,
             path_length_m=truth.path_length_m,
             energy_j=truth.energy_j,
             peak_contact_force_n=truth.peak_contact_force_n,
-            lateral_error_m=truth.entry_lateral_m,
-            vertical_error_m=truth.entry_vertical_m,
-            heading_error_rad=truth.entry_angle_rad,
-            entry_speed_m_s=truth.entry_speed_m_s,
-            pose_error_median_m=guidance.pose_error_median_m,
             attempts=flight.attempts,
             seed=seed,
             wall_s=wall_s,
             real_time_factor=truth.time_s / wall_s if wall_s > 0.0 else 0.0,
             versions=self._versions,
             config=self._plain_config,
+            **metrics.fields(truth),
         )
 
 

@@ -8,7 +8,7 @@ from typing import Protocol
 from auvdock.core.arrays import Array, Image
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Command, Percept, Proprioception
-from auvdock.core.station import ConicalStationCfg
+from auvdock.core.stations import StationCfg
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.episode.result import EpisodeResult
 from auvdock.sim.truth import Truth
@@ -31,7 +31,7 @@ class EpisodeSetup:
     """
 
     title: str
-    station: ConicalStationCfg
+    station: StationCfg
     vehicle: VehicleCfg
     camera: Camera
     T_world_station: Array

@@ -123,7 +123,7 @@ class ColumnWriter:
     def _write_modes(self, batch: _Batch, rows: Sequence[Row]) -> None:
         modes = [row.tick.command.mode for row in rows]
         batch.scalars(paths.MODE_NUMBER, np.array([self._modes.number(mode) for mode in modes], dtype=np.float64))
-        ahead_m = [float(row.tick.truth.nose_station_m[0]) for row in rows]
+        ahead_m = [row.tick.truth.to_go_m for row in rows]
         followed = (self._modes.follow(index, mode, ahead_m[index]) for index, mode in enumerate(modes))
         changes = [change for change in followed if change is not None]
         if changes:
@@ -164,8 +164,8 @@ def _measured(percept: Percept) -> PoseEstimate | None:
 
 
 def _ranges(rows: Sequence[Row]) -> Array:
-    """(n,) distance of the nose from the mouth's centre, m."""
-    return np.linalg.norm([row.tick.truth.nose_station_m for row in rows], axis=1)
+    """(n,) distance from the station, m."""
+    return np.array([row.tick.truth.range_m for row in rows])
 
 
 def _write_detections(frames: _Batch, percepts: Sequence[Percept]) -> None:

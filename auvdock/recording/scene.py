@@ -9,7 +9,8 @@ import numpy as np
 import rerun as rr
 
 from auvdock.core.camera import Camera
-from auvdock.core.station import FunnelCfg
+from auvdock.core.station import ConicalStationCfg
+from auvdock.core.stations import StationCfg
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.recording import paths
 from auvdock.recording.meshes import Mesh, beam_cone, frustum
@@ -59,7 +60,7 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
 
     static(paths.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     static(paths.STATION, _transform(setup.T_world_station))
-    for path, mesh in _station_meshes(setup.station.funnel).items():
+    for path, mesh in _station_meshes(setup.station).items():
         static(path, _mesh3d(mesh, rgba(200, 205, 210, 110)))
     _log_lights(stream, setup.station.layout)
     static(paths.HULL, _hull(setup.vehicle))
@@ -101,7 +102,10 @@ def _mesh3d(mesh: Mesh, colour: int) -> rr.Mesh3D:
     )
 
 
-def _station_meshes(funnel: FunnelCfg) -> dict[str, Mesh]:
+def _station_meshes(station: StationCfg) -> dict[str, Mesh]:
+    if not isinstance(station, ConicalStationCfg):
+        return {}
+    funnel = station.funnel
     throat = np.array([-funnel.length_m, 0.0, 0.0])
     return {
         paths.FUNNEL: frustum(

@@ -87,7 +87,10 @@ class Truth:
 
     @property
     def to_go_m(self) -> float:
-        """Distance yet to go: of the nose to the mouth's plane, negative inside; in landing, of the seat to its place."""
-        if self.landing is not None:
-            return float(np.linalg.norm(self.landing.seat_error_m))
-        return float(self.nose_station_m[0])
+        """Distance yet to go: of the nose to the mouth's plane, negative inside; landing: of the seat to its place."""
+        return float(self.nose_station_m[0]) if self.landing is None else self.range_m
+
+    @property
+    def range_m(self) -> float:
+        """Distance of the nose from the mouth's centre; in landing of the seat from its place."""
+        return float(np.linalg.norm(self.nose_station_m if self.landing is None else self.landing.seat_error_m))

@@ -10,8 +10,8 @@ import pytest
 from sim_bench import REMUS, STATION, command, run, simulator, start, state
 
 from auvdock.core.arrays import Array
-from auvdock.sim.mj import mujoco
 from auvdock.sim.docks import make_dock
+from auvdock.sim.mj import mujoco
 from auvdock.sim.scene import scene_xml
 from auvdock.sim.simulator import Simulator
 from auvdock.sim.station_geometry import STAVES, TUBE_STAVES, inner_radius_m

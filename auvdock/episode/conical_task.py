@@ -1,0 +1,92 @@
+"""Docking into the conical station."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from auvdock.controllers.pilot import ConicalPilot, Pilot
+from auvdock.core.contracts import Percept
+from auvdock.envs.vehicle_world import Sensed
+from auvdock.envs.world import DockingWorld
+from auvdock.episode.config import EpisodeCfg
+from auvdock.episode.metrics import GuidanceMetrics
+from auvdock.episode.trace import Tick
+from auvdock.perception.detectors import make_detector
+from auvdock.perception.pipeline import BeaconPerception
+from auvdock.sim.truth import Truth
+
+__all__ = ["ConicalTask"]
+
+_STAGES = {"acquire": "search", "abort": "timeout", "docked": "terminal"}
+"""Guidance modes whose failure cause has another name."""
+
+
+class ConicalTask:
+    """Implements `auvdock.episode.task.Task` for `EpisodeCfg`."""
+
+    name = "conical station"
+
+    def __init__(self, cfg: EpisodeCfg) -> None:
+        """Build world, detector, perception and pilot.
+
+        Raises:
+            ConfigError: a name that does not exist or a value that does not fit.
+        """
+        self._cfg = cfg
+        self.station = cfg.world.station
+        self.detector = cfg.perception.detector
+        self._detector = make_detector(self.detector)
+        self.world = DockingWorld(cfg.world, self.detector)
+        self._perception = BeaconPerception(cfg.perception, self.world.camera, self.station.layout)
+        self.pilot = make_pilot(cfg, self.world)
+
+    def reset(self) -> None:
+        """Forget the tracks."""
+        self._perception.reset()
+
+    def perceive(self, sensed: Sensed) -> Percept | None:
+        """Perception's answer to what was sensed; None if there was no new frame."""
+        if sensed.frame is not None:
+            return self._perception.update(self._detector.detect(sensed.frame), sensed.proprioception)
+        if sensed.detections is not None:
+            return self._perception.update(sensed.detections, sensed.proprioception)
+        return None
+
+    def metrics(self) -> ConicalMetrics:
+        """Metrics of a new episode."""
+        return ConicalMetrics(GuidanceMetrics(self.world.camera, self.station, self.world.simulator.T_world_station))
+
+    def stage(self, mode: str) -> str:
+        """The failure reason of an episode that ends in a guidance mode."""
+        return _STAGES.get(mode, mode)
+
+
+class ConicalMetrics:
+    """Precise guidance as paper A counts it, and how the nose passed the throat."""
+
+    def __init__(self, guidance: GuidanceMetrics) -> None:
+        """Start empty."""
+        self._guidance = guidance
+
+    def add(self, tick: Tick) -> None:
+        """Count one control period; those without a frame count nothing."""
+        if tick.percept is not None:
+            self._guidance.add(tick.truth, tick.percept)
+
+    def fields(self, truth: Truth) -> Mapping[str, Any]:
+        """Guidance and entry, named as in `EpisodeResult`."""
+        return {
+            **vars(self._guidance.summary()),
+            "lateral_error_m": truth.entry_lateral_m,
+            "vertical_error_m": truth.entry_vertical_m,
+            "heading_error_rad": truth.entry_angle_rad,
+            "entry_speed_m_s": truth.entry_speed_m_s,
+        }
+
+
+def make_pilot(cfg: EpisodeCfg, world: DockingWorld) -> Pilot[Any]:
+    """The pilot that a configuration asks for."""
+    return ConicalPilot(
+        cfg.control, world.simulator.vehicle, cfg.world.station, world.camera, 1.0 / cfg.world.control_hz
+    )

@@ -1,0 +1,83 @@
+"""What an episode is made of, and which task a configuration asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from auvdock.controllers.pilot import Pilot
+from auvdock.core.contracts import Percept
+from auvdock.core.stations import StationCfg
+from auvdock.envs.vehicle_world import Sensed, VehicleWorld
+from auvdock.episode.config import AnyEpisodeCfg
+from auvdock.episode.conical_task import ConicalTask
+from auvdock.episode.trace import Tick
+from auvdock.sim.truth import Truth
+
+__all__ = ["Task", "TaskMetrics", "make_task"]
+
+
+class TaskMetrics(Protocol):
+    """Gathers an episode's metrics tick by tick."""
+
+    def add(self, tick: Tick) -> None:
+        """Take in one control period."""
+        ...
+
+    def fields(self, truth: Truth) -> Mapping[str, Any]:
+        """The fields of `EpisodeResult` that this kind of docking fills, at the episode's end; the others keep None."""
+        ...
+
+
+class Task(Protocol):
+    """One kind of docking: a world, what perceives it, who flies in it, and how it is judged."""
+
+    @property
+    def name(self) -> str:
+        """The kind of station, for titles."""
+        ...
+
+    @property
+    def station(self) -> StationCfg:
+        """The station."""
+        ...
+
+    @property
+    def detector(self) -> str:
+        """Name of the detector."""
+        ...
+
+    @property
+    def world(self) -> VehicleWorld:
+        """Vehicle, station, water and camera."""
+        ...
+
+    @property
+    def pilot(self) -> Pilot[Any]:
+        """Flies the vehicle."""
+        ...
+
+    def reset(self) -> None:
+        """Forget the episode before; the world is reset apart from this."""
+        ...
+
+    def perceive(self, sensed: Sensed) -> Percept | None:
+        """Perception's answer to what was sensed; None if there was no new frame."""
+        ...
+
+    def metrics(self) -> TaskMetrics:
+        """Metrics of a new episode."""
+        ...
+
+    def stage(self, mode: str) -> str:
+        """The failure reason (`FAILURE_REASONS`) of an episode that ends in a guidance mode."""
+        ...
+
+
+def make_task(cfg: AnyEpisodeCfg) -> Task:
+    """The task that a configuration asks for.
+
+    Raises:
+        ConfigError: a name that does not exist or a value that does not fit.
+    """
+    return ConicalTask(cfg)
