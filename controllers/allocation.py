@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -23,20 +24,25 @@ class AllocationCfg:
 
     fin_weight: float = 0.1
     """Cost of a fin's squared command against a thruster's 1: a fin costs next to no energy."""
+    preload: float = 0.0
+    """Command with which opposed vectored thrusters push against each other, so that a weak wrench does not fall into
+    their dead bands; 0 for none. Groups with fins, or without redundant thrusters, have none."""
 
     def __post_init__(self) -> None:
-        """The weight divides."""
+        """The weight divides; the preload leaves room to work."""
         if not self.fin_weight > 0.0:
             raise ConfigError("control.allocation.fin_weight", self.fin_weight, "a weight above 0")
+        if not 0.0 <= self.preload <= 0.5:
+            raise ConfigError("control.allocation.preload", self.preload, "a command of 0 to 0.5")
 
 
 class ThrustAllocator:
     """Solves min cᵀ W c subject to B(u) c = τ with |c| ≤ 1 (Fossen 2011, section 12.3.2; Durham 1993 for the limits).
 
     B(u) has a thruster's wrench at command 1 in its column, or a fin's times u |u|. Roll, or any other axis on which
-    no thruster acts, is left alone. Actuators that share an axis form a group (axial, lateral, vertical); a group
-    whose wrench is out of reach gives the longest reachable wrench in the same direction, and the other groups are
-    not touched.
+    no thruster acts, is left alone. Actuators that share an axis form a group (axial, lateral, vertical for a torpedo
+    with tunnel thrusters; one of all six axes for vectored thrusters above or below the origin); a group whose wrench
+    is out of reach gives the longest reachable wrench in the same direction, and the other groups are not touched.
     """
 
     def __init__(self, vehicle: VehicleCfg, cfg: AllocationCfg | None = None) -> None:
@@ -54,7 +60,7 @@ class ThrustAllocator:
         rows = [row for row in range(6) if reach[row] > _TINY]
         inverse_weight = [1.0 / cfg.fin_weight if fin else 1.0 for fin in fins]
         self._groups = [
-            _Group(self._full, group_rows, columns, fins, inverse_weight)
+            _Group(self._full, group_rows, columns, fins, inverse_weight, cfg.preload)
             for group_rows, columns in _components(self._full, rows)
         ]
         self._dead_band = [actuator.dead_band for actuator in vehicle.actuators]
@@ -111,6 +117,7 @@ class _Group:
         columns: list[int],
         fins: list[bool],
         inverse_weight: list[float],
+        preload: float,
     ) -> None:
         self.rows, self.columns = rows, columns
         self._fins = [fins[column] for column in columns]
@@ -126,19 +133,34 @@ class _Group:
         if len(rows) == 1:  # a second axis that nothing acts on and that nothing is asked of
             thrusters = (thrusters[0], 0.0, 1.0)
         self._grams = (thrusters, moving)
+        # Without fins B does not depend on speed, and neither does its inverse, nor what gives no wrench.
+        self._inverse: Array | None = None
+        self._redundant: Array | None = None
+        if not self._planar and not any(self._fins):
+            matrix = np.array(self._effect)
+            weighted = matrix * np.array(self._inverse_weight)
+            self._inverse = weighted.T @ np.linalg.pinv(weighted @ matrix.T)
+            self._redundant = _null_space(matrix)
+        self._bias = _opposed(self._redundant, preload)
 
     def solve(self, wrench: Sequence[float], fin_effect: float, moments_first: bool = False) -> list[float]:
         """Commands for the group's part of the wrench, or for the longest part of it within reach."""
         commands = self._least(wrench, fin_effect)
         if max(commands) <= 1.0 and min(commands) >= -1.0:
-            return commands
-        null = _null_vector(self._scaled(fin_effect))
+            if self._bias is None:
+                return commands
+            loaded = [command + bias for command, bias in zip(commands, self._bias, strict=True)]
+            return loaded if max(loaded) <= 1.0 and min(loaded) >= -1.0 else commands
+        if self._redundant is not None:
+            longest = partial(_longest_of_many, null=self._redundant)
+        else:
+            longest = partial(_longest, null=_null_vector(self._scaled(fin_effect)))
         idle = [0.0] * len(commands)
         if moments_first and self.rows[0] < 3 <= self.rows[-1]:
-            turning, reach = _longest(idle, self._least([0.0, 0.0, 0.0, *wrench[3:]], fin_effect), null)
+            turning, reach = longest(idle, self._least([0.0, 0.0, 0.0, *wrench[3:]], fin_effect))
             if reach == 1.0:
-                return _longest(turning, self._least([*wrench[:3], 0.0, 0.0, 0.0], fin_effect), null)[0]
-        return _longest(idle, commands, null)[0]
+                return longest(turning, self._least([*wrench[:3], 0.0, 0.0, 0.0], fin_effect))[0]
+        return longest(idle, commands)[0]
 
     def add_wrench(self, wrench: list[float], commands: list[float], fin_effect: float) -> None:
         """Add the wrench of the commands."""
@@ -173,6 +195,9 @@ class _Group:
                 x, y = wrench[self.rows[0]], wrench[self.rows[-1]]
                 m, n = (d * x - b * y) / determinant, (a * y - b * x) / determinant
                 return [weight * (p * m + q * n) * (fin_effect if fin else 1.0) for p, q, weight, fin in self._columns]
+        if self._inverse is not None:
+            direct: list[float] = (self._inverse @ np.array([wrench[row] for row in self.rows])).tolist()
+            return direct
         matrix = np.array(self._scaled(fin_effect))
         weighted = matrix * np.array(self._inverse_weight)
         wanted = np.array([wrench[row] for row in self.rows])
@@ -218,6 +243,52 @@ def _null_vector(effect: list[list[float]]) -> list[float] | None:
     _, singular, rows = np.linalg.svd(np.array(effect))
     rank = int(np.sum(singular > _TINY * singular[0]))
     return rows[-1].tolist() if count - rank == 1 else None
+
+
+def _null_space(effect: Array) -> Array:
+    """(n, k) orthonormal columns that span the commands which give no wrench."""
+    _, singular, rows = np.linalg.svd(effect)
+    rank = int(np.sum(singular > _TINY * singular[0]))
+    return np.ascontiguousarray(rows[rank:].T)
+
+
+def _opposed(null: Array | None, preload: float) -> list[float] | None:
+    """Commands without a wrench, of greatest size `preload`: what all thrusters ahead would be, less what it gives.
+
+    For four vectored thrusters that is (1, 1, 1, 1), each pushing against its opposite. None if there is no such.
+    """
+    if null is None or preload == 0.0:
+        return None
+    ahead: Array = null @ null.sum(axis=0)
+    size = float(np.abs(ahead).max(initial=0.0))
+    return (ahead * (preload / size)).tolist() if size > 0.1 else None
+
+
+def _longest_of_many(base: list[float], push: list[float], null: Array) -> tuple[list[float], float]:
+    """As `_longest` for any number of redundant actuators: all solutions are base + λ push + N t.
+
+    A linear programme in (λ, t, s): max λ − ε s with |base + λ push + N t| ≤ s ≤ 1 and 0 ≤ λ ≤ 1; the small ε picks, of
+    the many solutions, one with the smallest greatest command. Some milliseconds, but only out of reach.
+    """
+    from scipy.optimize import linprog
+
+    count = len(base)
+    columns = np.column_stack([push, null])
+    bounded = np.ones((count, 1))
+    limits = np.vstack([np.hstack([columns, -bounded]), np.hstack([-columns, -bounded])])
+    start = np.array(base)
+    free = null.shape[1]
+    best = linprog(
+        [-1.0] + [0.0] * free + [1e-3],
+        A_ub=limits,
+        b_ub=np.concatenate([-start, start]),
+        bounds=[(0.0, 1.0)] + [(None, None)] * free + [(0.0, 1.0)],
+    )
+    reach = float(best.x[0]) if best.x is not None else 0.0
+    if reach > 1.0 - 1e-9:
+        reach = 1.0
+    shift = null @ np.array(best.x[1:-1]) if best.x is not None else np.zeros(count)
+    return np.clip(start + reach * np.array(push) + shift, -1.0, 1.0).tolist(), reach
 
 
 def _longest(base: list[float], push: list[float], null: list[float] | None) -> tuple[list[float], float]:

@@ -1,4 +1,4 @@
-"""Set-point autopilot: speeds, depth, pitch and heading in, body wrench out."""
+"""Set-point autopilot: speeds, depth, attitude and heading in, body wrench out."""
 
 from __future__ import annotations
 
@@ -76,6 +76,7 @@ class AutopilotSetpoint(NamedTuple):
         depth_m: depth to hold, positive down, or None.
         through_water: True if the speeds are through the water, False if over ground.
         turn_rad_s: rate at which the heading set-point itself turns, positive to port.
+        roll_rad: positive to starboard; for vehicles whose thrusters act on roll.
     """
 
     surge_m_s: float
@@ -86,21 +87,23 @@ class AutopilotSetpoint(NamedTuple):
     depth_m: float | None = None
     through_water: bool = False
     turn_rad_s: float = 0.0
+    roll_rad: float = 0.0
 
 
 class AutopilotState(NamedTuple):
     """Integrals (wrench units), shaped speed references (m/s) and smoothed current (m/s, world axes).
 
-    `current_m_s` is None before the first sample.
+    Integrals come in the order surge, sway, heave, pitch, heading, and roll where it is controlled. `current_m_s` is
+    None before the first sample.
     """
 
-    integrals: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    integrals: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
     references_m_s: Vector = (0.0, 0.0, 0.0)
     current_m_s: Vector | None = None
 
 
 class Autopilot:
-    """PI on body velocities, PID on pitch and heading, P on depth, with the hull's drag fed forward.
+    """PI on body velocities, PID on heading, pitch and (where thrusters act on it) roll, P on depth, drag fed forward.
 
     τ = PID(error) + ff, where ff balances drag, lift and Munk moment at the reference velocity through the water
     (reference over ground minus measured current), the net buoyancy, and the inertia along the shaped reference.
@@ -119,13 +122,18 @@ class Autopilot:
         self._cfg = cfg
         self._dt_s = dt_s
         self._smoothing = 1.0 - math.exp(-dt_s / cfg.current_time_constant_s)
-        self._loops = tuple(self.gains.loops[name].gains for name in ("surge", "sway", "heave", "pitch", "heading"))
+        names, rows = ("surge", "sway", "heave", "pitch", "heading", "roll"), (0, 1, 2, 4, 5, 3)
+        count = 5 if self.gains.roll is None else 6
+        self._rows = rows[:count]
+        self._loops = tuple(self.gains.loops[name].gains for name in names[:count])
         self._depth_gain = self.gains.depth.gains.kp
         thrusters = [index for index, actuator in enumerate(vehicle.actuators) if actuator.kind == "thruster"]
-        reach = np.abs(vehicle.thruster_wrenches_body[:, thrusters]).sum(axis=1).tolist()
-        # Surge has its own propeller to use up; lateral and vertical thrusters also serve the moments.
-        shares = (1.0, cfg.force_share, cfg.force_share, cfg.moment_share, cfg.moment_share)
-        self.limits = tuple(share * reach[row] for share, row in zip(shares, (0, 1, 2, 4, 5), strict=True))
+        wrenches = vehicle.thruster_wrenches_body[:, thrusters]
+        reach = np.abs(wrenches).sum(axis=1).tolist()
+        # A propeller that gives surge alone may be used up; thrusters that also serve the moments may not.
+        alone = np.abs(wrenches[1:, np.abs(wrenches[0]) > 1e-9]).max(initial=0.0) < 1e-9
+        shares = [1.0 if alone else cfg.force_share, cfg.force_share, cfg.force_share, *[cfg.moment_share] * 3]
+        self.limits = tuple(share * reach[row] for share, row in zip(shares, self._rows, strict=False))
         self._net_weight_n = vehicle.mass_kg * 9.81 - vehicle.buoyancy_n
         self._drag = [
             (
@@ -147,7 +155,7 @@ class Autopilot:
 
     def initial_state(self) -> AutopilotState:
         """At rest, integrals empty."""
-        return AutopilotState()
+        return AutopilotState(integrals=(0.0,) * len(self._loops))
 
     def step(
         self, state: AutopilotState, setpoint: AutopilotSetpoint, proprioception: Proprioception
@@ -196,25 +204,27 @@ class Autopilot:
         bound = cfg.max_heading_error_rad
         pitch_error = _clip(math.remainder(setpoint.pitch_rad - senses.pitch_rad, math.tau), bound)
         heading_error = _clip(math.remainder(setpoint.heading_rad - senses.yaw_rad, math.tau), bound)
-        _, q, r = senses.rate_rad_s
+        p, q, r = senses.rate_rad_s
         errors = (
             wanted[0] - measured[0],
             wanted[1] - measured[1],
             wanted[2] - measured[2],
             pitch_error,
             heading_error,
+            _clip(setpoint.roll_rad - senses.roll_rad, bound),
         )
-        rates = (0.0, 0.0, 0.0, q, r - setpoint.turn_rad_s)
+        rates = (0.0, 0.0, 0.0, q, r - setpoint.turn_rad_s, p)
         feeds = (
             feed[0] + lift[0] + push[0],
             feed[1] + lift[1] + push[1],
             feed[2] + lift[2] + push[2],
             feed[4],
             feed[5],
+            feed[3],
         )
-        outputs: list[float] = []
+        wrench = np.zeros(6)
         integrals: list[float] = []
-        for axis in range(5):
+        for axis, row in enumerate(self._rows):
             output, integral = pid_step(
                 self._loops[axis],
                 state.integrals[axis],
@@ -224,25 +234,21 @@ class Autopilot:
                 self.limits[axis],
                 dt_s,
             )
-            outputs.append(output)
+            wrench[row] = output
             turning = axis >= 3 and abs(errors[axis]) > cfg.integral_zone_rad
             integrals.append(state.integrals[axis] if turning else integral)
-        wrench = np.array([outputs[0], outputs[1], outputs[2], 0.0, outputs[3], outputs[4]])
-        kept = (integrals[0], integrals[1], integrals[2], integrals[3], integrals[4])
-        return wrench, AutopilotState(kept, references, current)
+        return wrench, AutopilotState(tuple(integrals), references, current)
 
     def settle(self, state: AutopilotState, wanted: Array, achieved: Array) -> AutopilotState:
         """Anti-windup for what allocation could not give: İ = (τ_achieved − τ_wanted) k_i/k_p (back-calculation)."""
         missing: list[float] = (achieved - wanted).tolist()
         if max(missing) < 1e-6 and min(missing) > -1e-6:
             return state
-        parts = (missing[0], missing[1], missing[2], missing[4], missing[5])
         corrected = [
-            integral + self._dt_s * part * gains.ki / max(gains.kp, 1e-9)
-            for integral, part, gains in zip(state.integrals, parts, self._loops, strict=True)
+            integral + self._dt_s * missing[row] * gains.ki / max(gains.kp, 1e-9)
+            for integral, row, gains in zip(state.integrals, self._rows, self._loops, strict=True)
         ]
-        kept = (corrected[0], corrected[1], corrected[2], corrected[3], corrected[4])
-        return AutopilotState(kept, state.references_m_s, state.current_m_s)
+        return AutopilotState(tuple(corrected), state.references_m_s, state.current_m_s)
 
     def _shape(self, reference: float, target: float, measured: float, acceleration_m_s2: float) -> float:
         """Next speed reference: towards the target at a bounded rate, not far from the measured speed."""

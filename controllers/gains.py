@@ -20,6 +20,7 @@ __all__ = [
     "design_gains",
     "loop_margins",
     "plant_transfer",
+    "rolls",
 ]
 
 
@@ -39,6 +40,8 @@ class DesignCfg:
     """Gain crossover of the pitch loop."""
     heading_crossover_rad_s: float = 1.8
     """Gain crossover of the heading loop."""
+    roll_crossover_rad_s: float = 2.0
+    """Gain crossover of the roll loop, where thrusters act on roll."""
     depth_crossover_rad_s: float = 0.35
     """Gain crossover of the depth loop, which gives the heave loop its set-point."""
     velocity_margin_deg: float = 65.0
@@ -54,7 +57,7 @@ class DesignCfg:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be designed for."""
-        for axis in ("surge", "sway", "heave", "pitch", "heading", "depth"):
+        for axis in ("surge", "sway", "heave", "roll", "pitch", "heading", "depth"):
             name = f"{axis}_crossover_rad_s"
             if not 0.01 <= getattr(self, name) <= 10.0:
                 raise ConfigError(f"control.design.{name}", getattr(self, name), "a crossover of 0.01 to 10 rad/s")
@@ -77,7 +80,7 @@ class LoopDesign:
 
 @dataclass(frozen=True)
 class AutopilotGains:
-    """All loops of the autopilot; `depth` is the outer loop around `heave`."""
+    """All loops of the autopilot; `depth` is the outer loop around `heave`, `roll` is None where nothing acts on it."""
 
     surge: LoopDesign
     sway: LoopDesign
@@ -85,11 +88,13 @@ class AutopilotGains:
     pitch: LoopDesign
     heading: LoopDesign
     depth: LoopDesign
+    roll: LoopDesign | None = None
 
     @property
     def loops(self) -> dict[str, LoopDesign]:
-        """By name."""
-        return {name: getattr(self, name) for name in ("surge", "sway", "heave", "pitch", "heading", "depth")}
+        """By name; with roll where there is one."""
+        loops = {name: getattr(self, name) for name in ("surge", "sway", "heave", "pitch", "heading", "depth")}
+        return loops if self.roll is None else {**loops, "roll": self.roll}
 
 
 def _library() -> Any:  # noqa: ANN401
@@ -100,7 +105,7 @@ def _library() -> Any:  # noqa: ANN401
 
 
 def plant_transfer(plant: AxisPlant, delay_s: float) -> Any:  # noqa: ANN401 - python-control ships no types
-    """Transfer function from wrench command to velocity (surge, sway, heave) or angle (pitch, heading).
+    """Transfer function from wrench command to velocity (surge, sway, heave) or angle (roll, pitch, heading).
 
     1/(m s + d) or 1/(I s² + d s + k), times 1/(τ s + 1), times a second-order Padé approximant of e^{−s T}.
     """
@@ -165,16 +170,21 @@ def _velocity_loop(plant: AxisPlant, delay_s: float, crossover: float, cfg: Desi
 
 
 def _attitude_loop(plant: AxisPlant, delay_s: float, crossover: float, cfg: DesignCfg) -> LoopDesign:
-    """PID: C(jω) = k_p + j (k_d ω − k_i/ω) with k_i = ratio ω k_p, hence k_p = |C| cos φ and k_d from the rest."""
+    """PID: C(jω) = k_p + j (k_d ω − k_i/ω) with k_i = ratio ω k_p, hence k_p = |C| cos φ and k_d from the rest.
+
+    A hull that damps itself so well that φ would be less than the integral's own lag gets no derivative action, and
+    more margin than was asked for.
+    """
     transfer = plant_transfer(plant, delay_s)
     size, phase = _controller_at_crossover(transfer, crossover, cfg.attitude_margin_deg)
-    if not 0.0 < phase < math.radians(85.0):
+    phase = max(phase, -math.atan(cfg.integral_ratio))
+    if phase > math.radians(85.0):
         raise ConfigError(
             f"control.design.{plant.axis}_crossover_rad_s", crossover, "a crossover that derivative action can support"
         )
     kp = size * math.cos(phase)
     ki = cfg.integral_ratio * crossover * kp
-    kd = (size * math.sin(phase) + ki / crossover) / crossover
+    kd = max(0.0, (size * math.sin(phase) + ki / crossover) / crossover)
     return _checked(plant.axis, PidGains(kp=kp, ki=ki, kd=kd), transfer, cfg)
 
 
@@ -211,4 +221,13 @@ def design_gains(vehicle: VehicleCfg, cfg: DesignCfg, dt_s: float) -> AutopilotG
         pitch=_attitude_loop(plants["pitch"], delay_s, cfg.pitch_crossover_rad_s, cfg),
         heading=_attitude_loop(plants["heading"], delay_s, cfg.heading_crossover_rad_s, cfg),
         depth=cascade_design(heave, plants["heave"], delay_s, cfg),
+        roll=_attitude_loop(plants["roll"], delay_s, cfg.roll_crossover_rad_s, cfg) if rolls(vehicle) else None,
+    )
+
+
+def rolls(vehicle: VehicleCfg) -> bool:
+    """Whether thrusters act on roll (a fin does not count: it is idle in a hover)."""
+    return any(
+        actuator.kind == "thruster" and abs(wrench) > 1e-9
+        for actuator, wrench in zip(vehicle.actuators, vehicle.thruster_wrenches_body[3], strict=True)
     )

@@ -17,9 +17,12 @@ from auvdock.core.vehicle import VehicleCfg
 __all__ = ["AXES", "AxisPlant", "acceleration", "axis_plants", "hydrodynamic_wrench", "linearise", "thruster_lag_s"]
 
 AXES = ("surge", "sway", "heave", "pitch", "heading")
-"""Controlled axes, in the order of the rows (0, 1, 2, 4, 5) of the body wrench; roll has no actuator."""
+"""Axes that every vehicle controls, in the order of the rows (0, 1, 2, 4, 5) of the body wrench.
 
-_ROWS = {"surge": 0, "sway": 1, "heave": 2, "pitch": 4, "heading": 5}
+Roll, row 3, is controlled by vehicles whose thrusters act on it; a torpedo's do not.
+"""
+
+_ROWS = {"surge": 0, "sway": 1, "heave": 2, "roll": 3, "pitch": 4, "heading": 5}
 _GRAVITY_M_S2 = 9.81
 
 
@@ -27,17 +30,17 @@ _GRAVITY_M_S2 = 9.81
 class AxisPlant:
     """One decoupled axis: inertia ẍ + damping ẋ + stiffness x = wrench, behind the thrusters' lag.
 
-    For surge, sway and heave ẋ is the controlled velocity; for pitch and heading x is the controlled angle.
+    For surge, sway and heave ẋ is the controlled velocity; for roll, pitch and heading x is the controlled angle.
     """
 
     axis: str
-    """One of `AXES`."""
+    """One of `AXES`, or "roll"."""
     inertia: float
     """kg, or kg m² for angles; added mass included."""
     damping: float
     """N s/m, or N m s/rad, at the operating point; 0 or more."""
     stiffness: float
-    """N m/rad: m g BG for pitch, 0 elsewhere."""
+    """N m/rad: m g BG for roll and pitch, 0 elsewhere."""
     lag_s: float
     """First-order time constant of the actuators."""
 
@@ -119,7 +122,7 @@ def axis_plants(vehicle: VehicleCfg, surge_m_s: float, slip_m_s: float = 0.0) ->
         slip_m_s: sideways and vertical speed through the water; quadratic damping grows with it.
 
     Returns:
-        A plant for each of `AXES`.
+        A plant for each of `AXES` and for "roll".
     """
     state_matrix, _ = linearise(vehicle, np.array([surge_m_s, slip_m_s, slip_m_s, 0.0, 0.0, 0.0]))
     mass = np.diag(vehicle.rigid_body_mass_body + vehicle.added_mass_body)
@@ -130,7 +133,7 @@ def axis_plants(vehicle: VehicleCfg, surge_m_s: float, slip_m_s: float = 0.0) ->
             axis=axis,
             inertia=float(mass[row]),
             damping=max(0.0, -float(state_matrix[row, row] * mass[row])),
-            stiffness=stiffness if axis == "pitch" else 0.0,
+            stiffness=stiffness if axis in ("roll", "pitch") else 0.0,
             lag_s=lag_s,
         )
         for axis, row in _ROWS.items()

@@ -94,15 +94,17 @@ class RelativeState(NamedTuple):
 class RelativeFilter:
     """Predict and update as pure functions of `RelativeState`."""
 
-    def __init__(self, cfg: FilterCfg, T_body_camera: Array, dt_s: float) -> None:
+    def __init__(self, cfg: FilterCfg, T_body_camera: Array, dt_s: float, front: Vector = (1.0, 0.0, 0.0)) -> None:
         """Precompute noise and mounting.
 
         Args:
             cfg: noise levels.
             T_body_camera: (4, 4) pose of the camera on the body.
             dt_s: control period.
+            front: side of the station, station frame, from which its lights can be seen: a first pose lies there.
         """
         self._cfg = cfg
+        self._front = front
         self._dt_s = dt_s
         self._lever: Vector = (float(T_body_camera[0, 3]), float(T_body_camera[1, 3]), float(T_body_camera[2, 3]))
         self._R_body_camera = np.ascontiguousarray(T_body_camera[:3, :3])
@@ -142,7 +144,9 @@ class RelativeFilter:
         pitch = -math.asin(max(-1.0, min(1.0, float(R_station_body[2, 0]))))
         roll = math.atan2(float(R_station_body[2, 1]), float(R_station_body[2, 2]))
         limit = self._cfg.max_tilt_mismatch_rad
-        if abs(pitch - senses.pitch_rad) > limit or abs(roll - senses.roll_rad) > limit or float(T[0, 3]) < 0.0:
+        x, y, z = T[:3, 3].tolist()
+        front = self._front[0] * x + self._front[1] * y + self._front[2] * z
+        if abs(pitch - senses.pitch_rad) > limit or abs(roll - senses.roll_rad) > limit or front < 0.0:
             return None
         yaw = math.atan2(float(R_station_body[1, 0]), float(R_station_body[0, 0]))
         noise = self._cfg.inflation * cov + self._floor
@@ -150,7 +154,6 @@ class RelativeFilter:
         select = np.zeros((4, 6))
         select[:3, :3] = np.eye(3)
         select[3, 3:] = -T[2, :3]
-        x, y, z = T[:3, 3].tolist()
         return RelativeState(
             (x, y, z),
             math.remainder(senses.yaw_rad - yaw, math.tau),

@@ -1,0 +1,79 @@
+"""Everything that can be set about the landing pilot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from auvdock.controllers.allocation import AllocationCfg
+from auvdock.controllers.autopilot import AutopilotCfg
+from auvdock.controllers.gains import DesignCfg
+from auvdock.controllers.landing.guidance import LandingGuidanceCfg
+from auvdock.controllers.landing.modes import LandingModeCfg
+from auvdock.controllers.landing.search import SpiralCfg
+from auvdock.controllers.relative_state import FilterCfg
+
+__all__ = ["HoverAllocationCfg", "HoverAutopilotCfg", "HoverDesignCfg", "HoverFilterCfg", "LandingControlCfg"]
+
+
+@dataclass(frozen=True)
+class HoverDesignCfg(DesignCfg):
+    """Loops for a vehicle that hovers: designed near zero speed, stiffer in attitude."""
+
+    surge_m_s: float = 0.1
+    """Speed through the water at which the vehicle is linearised: a station-keeping vehicle's in a weak current."""
+    surge_crossover_rad_s: float = 1.2
+    """Gain crossover of the surge speed loop."""
+    pitch_crossover_rad_s: float = 2.5
+    """Gain crossover of the pitch loop."""
+    roll_crossover_rad_s: float = 2.5
+    """Gain crossover of the roll loop, where thrusters act on roll."""
+
+
+@dataclass(frozen=True)
+class HoverAutopilotCfg(AutopilotCfg):
+    """Autopilot for a vehicle that hovers."""
+
+    design: HoverDesignCfg = HoverDesignCfg()
+    """What the loops shall achieve."""
+    sway_acceleration_m_s2: float = 0.25
+    """Fastest change of the sway and heave references: a descent must be stopped within decimetres."""
+
+
+@dataclass(frozen=True)
+class HoverAllocationCfg(AllocationCfg):
+    """Allocation for a vehicle that hovers, often with next to no thrust."""
+
+    preload: float = 0.03
+    """Vectored thrusters push against each other with 0.9 N of a T200's 30 N: twice its dead band."""
+
+
+@dataclass(frozen=True)
+class HoverFilterCfg(FilterCfg):
+    """Relative filter over a few metres, where poses are good to a centimetre and dead reckoning to millimetres."""
+
+    position_walk_m_rs: float = 0.006
+    """Dead reckoning: a DVL of 3 mm/s at 20 Hz makes 0.7 mm/√s, its scale error and the compass a few more."""
+    heading_walk_rad_rs: float = 0.002
+    """The bearing of the station's axis."""
+    position_floor_m: float = 0.005
+    """Added to a measured position's standard deviation."""
+    rotation_floor_rad: float = 0.015
+    """Added to a measured rotation's standard deviation: inclinometer, compass and the station's own tilt."""
+
+
+@dataclass(frozen=True)
+class LandingControlCfg:
+    """Settings of the landing pilot."""
+
+    autopilot: HoverAutopilotCfg = HoverAutopilotCfg()
+    """Loops and their limits."""
+    allocation: HoverAllocationCfg = HoverAllocationCfg()
+    """Wrench to actuators."""
+    filter: HoverFilterCfg = HoverFilterCfg()
+    """Relative state."""
+    guidance: LandingGuidanceCfg = LandingGuidanceCfg()
+    """Speeds, corridor, station keeping."""
+    search: SpiralCfg = SpiralCfg()
+    """Looking for the station."""
+    modes: LandingModeCfg = LandingModeCfg()
+    """Mode machine."""

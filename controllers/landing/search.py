@@ -1,0 +1,56 @@
+"""Looking for the station from above: hold, climb, and spiral around the place where it was last thought to be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from auvdock.core.errors import ConfigError
+
+__all__ = ["SpiralCfg", "spiral"]
+
+
+@dataclass(frozen=True)
+class SpiralCfg:
+    """The search pattern; all values are ours."""
+
+    settle_s: float = 2.0
+    """Wait on the spot before the first turn: perception needs some frames."""
+    height_m: float = 4.5
+    """The seat is taken at least so high above its place on the station: the view widens with height."""
+    climb_m_s: float = 0.2
+    """Speed of that climb."""
+    pitch_m: float = 1.2
+    """Distance between two turns of the spiral."""
+    speed_m_s: float = 0.25
+    """Speed along it."""
+    max_radius_m: float = 5.0
+    """The spiral ends in a circle of this radius."""
+
+    def __post_init__(self) -> None:
+        """All are positive; the wait may be none."""
+        for name, value in vars(self).items():
+            if not (value > 0.0 or (name == "settle_s" and value == 0.0)):
+                raise ConfigError(f"control.search.{name}", value, "a value above 0")
+
+
+def spiral(time_s: float, cfg: SpiralCfg) -> tuple[float, float]:
+    """Where to be on the spiral, relative to its centre, m.
+
+    An Archimedean spiral r = p θ/2π flown at speed v has the arc s ≈ p θ²/4π = v t, hence θ = √(4π v t/p); beyond the
+    greatest radius R it goes on as a circle with θ̇ = v/R.
+
+    Args:
+        time_s: time since the search began.
+        cfg: the pattern.
+    """
+    flown_s = max(0.0, time_s - cfg.settle_s)
+    last_rad = math.tau * cfg.max_radius_m / cfg.pitch_m
+    last_s = cfg.pitch_m * last_rad**2 / (4.0 * math.pi * cfg.speed_m_s)
+    if flown_s <= last_s:
+        angle = math.sqrt(4.0 * math.pi * cfg.speed_m_s * flown_s / cfg.pitch_m)
+        radius = cfg.pitch_m * angle / math.tau
+    else:
+        angle = last_rad + (flown_s - last_s) * cfg.speed_m_s / cfg.max_radius_m
+        radius = cfg.max_radius_m
+    return radius * math.cos(angle), radius * math.sin(angle)

@@ -1,0 +1,125 @@
+"""A bench for the landing pilot: either vehicle in open water, an ideal eye, and the latch's limits without guides.
+
+No guide helps and no platform stops the vehicle: it must come to the seat by itself.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from hover_bench import DT_S, VEHICLES, Hoverer
+
+from auvdock.controllers.landing.config import LandingControlCfg
+from auvdock.controllers.landing.pilot import LandingPilot
+from auvdock.core.camera import CameraCfg, make_camera
+from auvdock.core.contracts import Bearing, PoseEstimate
+from auvdock.core.landing_station import load_landing_station
+from auvdock.core.marine import flip_vector
+from auvdock.core.transforms import invert, make_transform
+
+STATION = load_landing_station()
+STATION_WORLD_M = np.array([30.0, 0.0, -STATION.depth_m])
+CAMERA_CFG = CameraCfg(800, 600, 20.0, 50.0, 38.6)
+CAMERAS = {
+    name: make_camera(CAMERA_CFG, *(flip_vector(np.array(part)) for part in (m.position_m, m.direction, m.up)))
+    for name, m in ((name, vehicle.belly_camera) for name, vehicle in VEHICLES.items())
+}
+PILOTS = {
+    name: LandingPilot(LandingControlCfg(), vehicle, STATION, CAMERAS[name], DT_S) for name, vehicle in VEHICLES.items()
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Glance:
+    """What the pilot reads of a landing percept."""
+
+    pose: PoseEstimate | None
+    long_range: Bearing | None
+    status: str
+
+
+BLIND = Glance(None, None, "searching")
+
+
+def look(name, T_world_body, rng=None):
+    """A pose if four lights or the whole tag are in the image, a bearing if any light is; 1 cm and 0.5° of noise."""
+    camera = CAMERAS[name]
+    T_station_camera = make_transform(np.eye(3), -STATION_WORLD_M) @ T_world_body @ camera.T_body_camera
+    T_camera_station = invert(T_station_camera)
+
+    def seen(points):
+        local = points @ T_camera_station[:3, :3].T + T_camera_station[:3, 3]
+        return local, camera.in_view(local)
+
+    lights, lit = seen(STATION.layout.positions_m)
+    half = 0.5 * STATION.tag.size_m
+    _, tag = seen(np.array(STATION.tag.position_m) + half * np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]]))
+    noise = rng.standard_normal if rng is not None else np.zeros
+    pose = None
+    if lit.sum() >= 4 or tag.all():
+        height = float(T_station_camera[2, 3])
+        sigma = np.array([0.003 * height, 0.003 * height, 0.004 * height, 0.01, 0.01, 0.009])
+        error = sigma * noise(6)
+        turn = np.array([[0, -error[5], error[4]], [error[5], 0, -error[3]], [-error[4], error[3], 0]])
+        T = T_station_camera.copy()
+        T[:3, 3] += error[:3]
+        T[:3, :3] = T[:3, :3] @ (np.eye(3) + turn + turn @ turn / 2.0)
+        pose = PoseEstimate(T, np.diag(sigma**2), (), "bench", 0.5)
+    bearing = None
+    if lit.any():
+        ray = lights[lit].mean(axis=0)
+        bearing = Bearing(ray / np.linalg.norm(ray), np.zeros(2), 0.9)
+    return Glance(pose, bearing, "tracking" if pose is not None else "searching")
+
+
+class Lander(Hoverer):
+    """A vehicle above the station, which latches it when its seat is where the latch can reach it."""
+
+    def __init__(self, name, height_m=4.0, ahead_m=0.0, port_m=0.0, yaw_deg=0.0, **more):
+        self.name = name
+        self.vehicle = VEHICLES[name]
+        self.seat_m = flip_vector(np.array(self.vehicle.seat_m))
+        place = np.array([ahead_m, port_m, STATION.guide.seat_height_m + height_m])
+        super().__init__(name, math.radians(yaw_deg), position_m=STATION_WORLD_M + place - self.seat_m, **more)
+        self.latched = False
+        self.latch_works = True
+        self.fastest_m_s = 0.0
+
+    def offset(self):
+        """The seat from its place: ξ, η, ζ in m, and ψ in rad."""
+        T = self.T_world_body
+        seat = T[:3, :3] @ self.seat_m + T[:3, 3] - STATION_WORLD_M
+        return np.array([seat[0], seat[1], seat[2] - STATION.guide.seat_height_m, math.atan2(T[1, 0], T[0, 0])])
+
+    def senses(self):
+        senses = super().senses()
+        latch = STATION.latch
+        x, y, z, psi = self.offset()
+        speed = float(np.linalg.norm(self.simulator.truth.nu_body[:3]))
+        if z < 0.2:
+            self.fastest_m_s = max(self.fastest_m_s, -float(self.simulator.truth.nu_body[2]))
+        self.latched = self.latched or bool(
+            self.latch_works
+            and abs(x) < latch.along_m
+            and abs(y) < latch.across_m
+            and abs(z) < latch.height_m
+            and abs(math.degrees(psi)) < latch.max_heading_deg
+            and speed < latch.max_speed_m_s
+        )
+        return dataclasses.replace(senses, latched=self.latched)
+
+
+def fly(lander, time_s, spoil=lambda glance, lander: glance, seed=1, pilot=None):
+    """Closed loop; yields (offset, glance, command)."""
+    pilot, rng = pilot or PILOTS[lander.name], np.random.default_rng(seed)
+    state = pilot.initial_state()
+    for _ in range(round(time_s / DT_S)):
+        senses = lander.senses()
+        glance = spoil(look(lander.name, lander.T_world_body, rng), lander)
+        command, state = pilot.step(state, glance, senses)
+        yield lander.offset(), glance, command
+        if command.mode == "docked" or command.giving_up:
+            return
+        lander.step(command.values)
