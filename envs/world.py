@@ -51,11 +51,11 @@ class DockingWorld(VehicleWorld):
             cfg.imaging,
             self.simulator.T_world_station,
         )
-        self.imager = UnderwaterCamera(*optics, scene=self.simulator)
+        self.imager = UnderwaterCamera(*optics, scene=self.simulator, rotating=cfg.station.rotating)
         self._beacon_sensor: BeaconSensor | None = None
         if cfg.fidelity == "beacons":
             model = detection_model(cfg.detection_model, detector)
-            self._beacon_sensor = BeaconSensor(*optics, detector, model=model)
+            self._beacon_sensor = BeaconSensor(*optics, detector, model=model, rotating=cfg.station.rotating)
 
     def _draw_start(self, rng: np.random.Generator) -> Start:
         position_m, quat_wxyz = draw_start(self.cfg.start, self.cfg.station.depth_m, rng)

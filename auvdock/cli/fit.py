@@ -88,5 +88,7 @@ def sample_poses(count: int, station_depth_m: float, rng: np.random.Generator) -
 def _toml(model: DetectionModelCfg) -> str:
     lines: list[str] = []
     for name, value in dataclasses.asdict(model).items():
+        if value is None:
+            continue
         lines.append(f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {float(value):.6g}")
     return "\n".join(lines) + "\n"

@@ -23,9 +23,11 @@ DEFAULT_LEVEL = 1
 def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None) -> T:
     """Fill the dataclass `cls` from flags; wrong flags end the program with exit code 2, as argparse's do."""
     doc = (cls.__doc__ or "").strip()
+    # What a configuration may leave out (a rotating beacon) shall give flags where it is there, never subcommands.
+    config = (tyro.conf.AvoidSubcommands,)
     if default is None:
-        return tyro.cli(cls, args=list(argv), prog=prog, description=doc)
-    return tyro.cli(cls, args=list(argv), prog=prog, description=doc, default=default)
+        return tyro.cli(cls, args=list(argv), prog=prog, description=doc, config=config)
+    return tyro.cli(cls, args=list(argv), prog=prog, description=doc, default=default, config=config)
 
 
 def base_config(argv: Sequence[str]) -> EpisodeCfg:

@@ -20,6 +20,8 @@ from auvdock.core.strict import load_toml
 __all__ = [
     "Candidates",
     "DetectionModelCfg",
+    "Flash",
+    "FlashModelCfg",
     "draw_detections",
     "load_detection_model",
     "merge_close",
@@ -29,6 +31,40 @@ __all__ = [
 
 _ONES = np.ones(2)
 _HAZE_PX = 20.0
+_GHOST_FLUX = 0.3
+"""Flux of haze that breaks into spots, over that of the dimmest light (ours)."""
+
+
+@dataclass(frozen=True)
+class FlashModelCfg:
+    """Behaviour of a detector towards a rotating beacon: a light whose halo and beam decide about size and shape.
+
+    Found with probability 1 / (1 + (C_50 / C)^slope), C the code of its peak above the code at `background_px`.
+    """
+
+    contrast_50_dn: float = 9.0
+    """Contrast at which half of the flashes are found."""
+    slope: float = 12.0
+    """Steepness in ln C."""
+    background_px: float = 25.0
+    """What is broader than this the detector takes for background."""
+    box_scale: float = 1.0
+    """Size of the box over the size of the part that is brighter than half of the peak."""
+    centre_shift: float = 0.5
+    """Shift of the centre along the beam over the shift of the box's middle."""
+    centre_spread: float = 0.1
+    """Standard deviation of the centre per axis over the box's mean half side, at a contrast of ten times the noise."""
+    flux_spread: float = 0.05
+    """Standard deviation of ln(flux), beyond shot noise."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no width."""
+        for name in ("contrast_50_dn", "slope", "background_px", "box_scale"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise ConfigError(f"detection.flash.{name}", getattr(self, name), "a number above 0")
+        for name in ("centre_shift", "centre_spread", "flux_spread"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise ConfigError(f"detection.flash.{name}", getattr(self, name), "0 or more")
 
 
 @dataclass(frozen=True)
@@ -67,6 +103,8 @@ class DetectionModelCfg:
     spots. It falls with the share of lights that are; see `veiled_share`."""
     wrong_colour: float
     """Share of detections of the wrong class."""
+    flash: FlashModelCfg | None = None
+    """Towards a rotating beacon; None: the defaults of `FlashModelCfg`."""
 
     def __post_init__(self) -> None:
         """Refuse what is no probability or no width."""
@@ -79,6 +117,20 @@ class DetectionModelCfg:
         for name in ("ceiling", "wrong_colour"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ConfigError(f"detection.{name}", getattr(self, name), "a probability of 0 to 1")
+
+
+class Flash(NamedTuple):
+    """The rotating beacon as a candidate.
+
+    Attributes:
+        index: its place among the candidates.
+        half_px: (2,) half sides of the box about the part brighter than half of the peak.
+        shift_px: (2,) from the lamp to the middle of that box.
+    """
+
+    index: int
+    half_px: Array
+    shift_px: Array
 
 
 class Candidates(NamedTuple):
@@ -94,6 +146,9 @@ class Candidates(NamedTuple):
         flux: (m,) weight of the light in a merged centre.
         distance2_px2: (m, m) squared distances between them.
         red: (m,) whether red is its brightest channel: class `RED` (1), else `BLUE` (0).
+        flash: the rotating beacon among them, None if it is not in view.
+        light_e_s: (m,) what a detector measures as flux, photo-electrons per second; None without a rotating beacon.
+        light_noise_e_s: (m,) its standard deviation by shot and read noise.
     """
 
     pixels: Array
@@ -105,6 +160,12 @@ class Candidates(NamedTuple):
     flux: Array
     distance2_px2: Array
     red: BoolArray
+    flash: Flash | None = None
+    light_e_s: Array | None = None
+    light_noise_e_s: Array | None = None
+
+
+_FLASH = FlashModelCfg()
 
 
 def load_detection_model(name: str) -> DetectionModelCfg:
@@ -137,6 +198,9 @@ def draw_detections(
     odds += model.contrast_50_dn
     odds /= np.maximum(contrast, 1e-3)
     odds **= model.slope
+    flash, ways = seen.flash, model.flash or _FLASH
+    if flash is not None:
+        odds[flash.index] = (ways.contrast_50_dn / max(float(contrast[flash.index]), 1e-3)) ** ways.slope
     odds += 1.0
     hit = (chance[0] * odds < model.ceiling) & (contrast > 1e-3)
     index = hit.nonzero()[0]
@@ -155,6 +219,18 @@ def draw_detections(
     score = snr / (snr + 10.0)
     class_id = (merged.red[index] != (chance[1, index] < model.wrong_colour)).astype(np.int64)
     half = np.maximum(merged.radius_px[index], width)[:, None]
+    if flash is not None and hit[flash.index]:
+        place = int(np.flatnonzero(index == flash.index)[0])
+        half = np.repeat(half, 2, axis=1)
+        half[place] = np.maximum(half[place], ways.box_scale * flash.half_px)
+        noise_over_contrast = 10.0 * float(merged.noise_dn[flash.index] / contrast[flash.index])
+        spread_px = ways.centre_spread * noise_over_contrast * float(half[place].mean())
+        centre[place] += ways.centre_shift * flash.shift_px + spread_px * rng.standard_normal(2)
+    flux = None
+    if merged.light_e_s is not None and merged.light_noise_e_s is not None:
+        draws = rng.standard_normal((2, len(index)))
+        light = merged.light_e_s[index] * np.exp(ways.flux_spread * draws[0])
+        flux = np.maximum(light + merged.light_noise_e_s[index] * draws[1], 0.0)
     xyxy = np.empty((len(index), 4))
     xyxy[:, :2] = centre - half
     xyxy[:, 2:] = centre + half
@@ -165,7 +241,9 @@ def draw_detections(
         xyxy = np.concatenate([xyxy, np.concatenate([ghosts - 2.0, ghosts + 2.0], axis=1)])
         score = np.concatenate([score, rng.uniform(0.2, 0.5, alarms)])
         class_id = np.concatenate([class_id, rng.integers(0, 2, alarms)])
-    return Detections(xyxy, centre, score, class_id)
+        if flux is not None:
+            flux = np.concatenate([flux, np.full(alarms, _GHOST_FLUX * (float(flux.min()) if len(flux) else 1.0))])
+    return Detections(xyxy, centre, score, class_id, flux)
 
 
 def squared_distances(pixels: Array) -> Array:

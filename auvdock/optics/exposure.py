@@ -8,11 +8,19 @@ radiometry.
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from collections.abc import Callable
 
+from auvdock.core.camera import Camera
+from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.optics.settings import ExposureCfg
 
-__all__ = ["AutoExposure"]
+__all__ = ["AutoExposure", "frames_of_a_turn"]
+
+
+_GREATEST_FALL = 4.0
+_GREATEST_RISE = 2.0
 
 
 class AutoExposure:
@@ -20,11 +28,24 @@ class AutoExposure:
 
     With s the saturated share and s* the wanted one, sensitivity (time × gain) changes per frame by (s* / s)^½, bounded
     by `max_step`, unless s lies within the dead band. Time is used first, then gain.
+
+    A light that flashes by would be met at the sensitivity of the dark before it. With a memory the camera meters for
+    the brightest of the frames in it, each share taken in proportion to sensitivity: it falls at once, by up to 4 a
+    frame (ours: a pass takes some ten frames), and rises only as far as the last flash allows, by no more than 2 within
+    the memory (a flash that saturates nothing does not tell how much brighter it may be).
     """
 
-    def __init__(self, cfg: ExposureCfg) -> None:
-        """Start at the initial exposure."""
+    def __init__(self, cfg: ExposureCfg, memory_frames: int = 0) -> None:
+        """Start at the initial exposure.
+
+        Args:
+            cfg: the law's settings.
+            memory_frames: number of frames that are remembered; 0 meters the last one alone.
+        """
         self._cfg = cfg
+        self._memory: deque[tuple[float, float]] | None = None
+        if memory_frames > 0:
+            self._memory = deque(maxlen=memory_frames)
         self._sensitivity_s = cfg.initial_s
         self.settled = False
 
@@ -47,6 +68,8 @@ class AutoExposure:
         """Forget the frames before; the next frame is the first."""
         self._sensitivity_s = self._cfg.initial_s
         self.settled = False
+        if self._memory is not None:
+            self._memory.clear()
 
     def settle(self, share_at: Callable[[float], float]) -> None:
         """Choose the first frame's exposure as if the camera had been looking at the scene for a while.
@@ -70,9 +93,25 @@ class AutoExposure:
         """Take note of a frame; changes the exposure of the next."""
         if not self._cfg.automatic:
             return
+        fall = self._cfg.max_step
+        if self._memory is not None:
+            self._memory.append((saturated_share, self._sensitivity_s))
+            if saturated_share <= self._cfg.saturated_share:
+                now_s = self._sensitivity_s
+                saturated_share = max(share * now_s / then_s for share, then_s in self._memory)
+                # What was too bright then has been dealt with then.
+                saturated_share = min(saturated_share, self._cfg.saturated_share)
+            fall = max(fall, _GREATEST_FALL)
         ratio = self._cfg.saturated_share / max(saturated_share, 1e-9)
         if 1.0 / (1.0 + self._cfg.dead_band) < ratio < 1.0 + self._cfg.dead_band:
             return
-        step = min(max(ratio**0.5, 1.0 / self._cfg.max_step), self._cfg.max_step)
+        step = min(max(ratio**0.5, 1.0 / fall), self._cfg.max_step)
         high = self._cfg.max_s * self._cfg.max_gain
+        if self._memory is not None:
+            high = min(high, _GREATEST_RISE * min(then_s for _, then_s in self._memory))
         self._sensitivity_s = min(max(self._sensitivity_s * step, self._cfg.min_s), high)
+
+
+def frames_of_a_turn(camera: Camera, rotating: RotatingBeaconCfg | None) -> int:
+    """Frames that a camera takes in a turn of a rotating beacon and a tenth of one; 0 without a beacon."""
+    return 0 if rotating is None else math.ceil(1.1 * camera.rate_hz / rotating.rate_rev_s)

@@ -15,7 +15,9 @@ from auvdock.core.camera import Camera
 from auvdock.core.contracts import Frame
 from auvdock.core.landing_station import TagCfg
 from auvdock.core.response import CameraResponse
-from auvdock.optics.exposure import AutoExposure
+from auvdock.core.rotating_beacon import RotatingBeaconCfg
+from auvdock.optics.beam_image import BeamImage
+from auvdock.optics.exposure import AutoExposure, frames_of_a_turn
 from auvdock.optics.faults import FaultCfg, TagCover
 from auvdock.optics.lamp import LampCfg
 from auvdock.optics.lights_image import LightsImage, add_spot
@@ -76,6 +78,7 @@ class UnderwaterCamera:
         cfg: ImagingCfg,
         T_world_station: Array,
         scene: HasModel | None = None,
+        rotating: RotatingBeaconCfg | None = None,
         *,
         seen_from: str = "front",
         tag: TagCfg | None = None,
@@ -92,6 +95,7 @@ class UnderwaterCamera:
             cfg: the camera as an instrument.
             T_world_station: (4, 4) pose of the station frame.
             scene: owner of the MuJoCo model whose static geoms are drawn; without it only lights are.
+            rotating: the station's rotating beacon, if it has one.
             seen_from: "front" for a funnel along x, "above" for a platform whose lights shine up.
             tag: a marker on the station; a geom named `TAG_GEOM` of the model is left out in its favour.
             lamp: the vehicle's own lamps beside the camera.
@@ -105,6 +109,7 @@ class UnderwaterCamera:
             nuisance,
             cfg,
             T_world_station,
+            rotating,
             seen_from=seen_from,
             lamp=lamp,
             dead_lights=faults.dead_lights,
@@ -112,7 +117,7 @@ class UnderwaterCamera:
         self.tag = TagImage(TagScene(self.lit, tag)) if tag is not None else None
         self._cover = TagCover(faults)
         self._hidden = False
-        self.exposure = AutoExposure(cfg.exposure)
+        self.exposure = AutoExposure(cfg.exposure, frames_of_a_turn(camera, rotating))
         self._cfg, self._camera, self._water = cfg, camera, water
         self._response = CameraResponse(cfg.encoding, cfg.full_well_e, cfg.read_noise_e)
         self._sensor = Sensor(camera.width_px, camera.height_px, cfg)
@@ -120,6 +125,7 @@ class UnderwaterCamera:
         self._surfaces = Surfaces(self.lit, scene.model, hidden) if scene is not None and cfg.surfaces else None
         solid = self.lit.lens.solid_angle_sr.astype(np.float32)
         self._solid_angle = solid[:, :, None]
+        self._beam_image: BeamImage | None = None
         self._buffer = np.empty((camera.height_px, camera.width_px, 3), dtype=np.float32)
         self.reset(np.random.default_rng(0))
 
@@ -127,6 +133,8 @@ class UnderwaterCamera:
         """Start an episode: new noise, new nuisances, exposure from scratch."""
         self.lit.reset(rng)
         self._lights = LightsImage(self.lit.lens, self.lit.lights, self._water, self.lit.spots)
+        if self.lit.rotating is not None:
+            self._beam_image = BeamImage(self.lit.lens, self.lit.lights, self.lit.rotating.lamp, self._water)
         self._sensor.reset(self.lit.sensor_rng)
         self.exposure.reset()
         self._cover.reset()
@@ -136,17 +144,22 @@ class UnderwaterCamera:
         if self._surfaces is not None:
             self._surfaces.close()
 
-    def capture(self, T_world_body: Array, time_s: float) -> Frame:
+    def capture(self, T_world_body: Array, time_s: float, station_time_s: float | None = None) -> Frame:
         """Take a frame from a body pose (4, 4).
+
+        Args:
+            T_world_body: (4, 4) pose of the vehicle.
+            time_s: time of mid exposure by the vehicle's clock: the frame's time stamp.
+            station_time_s: the same by the station's clock, which turns the rotating beacon; None: the two agree.
 
         Raises:
             GraphicsError: surfaces are to be seen and no OpenGL context can be had.
         """
-        return self.take(T_world_body, time_s).frame
+        return self.take(T_world_body, time_s, station_time_s).frame
 
-    def take(self, T_world_body: Array, time_s: float) -> Shot:
+    def take(self, T_world_body: Array, time_s: float, station_time_s: float | None = None) -> Shot:
         """Take a frame as `capture` does, with what it was made of: for fitting detection models."""
-        view = self.lit.look(T_world_body, time_s)
+        view = self.lit.look(T_world_body, time_s, station_time_s, self.exposure.exposure_s)
         if self.tag is not None:
             self._hidden = self._cover.hidden(self.tag.scene.height_m(view.T_world_camera), time_s)
         if not self.exposure.settled:
@@ -171,6 +184,8 @@ class UnderwaterCamera:
         received = view.received
         lit = np.flatnonzero((received.halo_w_m2 + received.core_w_m2 > 0.0) & (received.ray_camera[:, 2] > 0.0))
         coarse = self._lights.coarse(received, lit, exposure_s)
+        if view.beam is not None and self._beam_image is not None:
+            self._beam_image.add(coarse, view.beam, exposure_s)
         size = (self._camera.width_px, self._camera.height_px)
         fine_size = (lens.shape[1] * lens.factor, lens.shape[0] * lens.factor)
         surfaces = self._surfaces

@@ -10,6 +10,7 @@ import numpy as np
 from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.beacons import BeaconCfg, BeaconLayout
 from auvdock.core.camera import Camera
+from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.transforms import invert
 from auvdock.optics.bands import BANDS_NM, electrons_per_joule
 from auvdock.optics.faults import dead_indices
@@ -17,6 +18,7 @@ from auvdock.optics.lamp import LampCfg, VehicleLamp
 from auvdock.optics.lens import Lens
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_streams
 from auvdock.optics.radiometry import LightSet, Received
+from auvdock.optics.rotating_light import Beam, RotatingLight
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.snow import Flakes, MarineSnow
@@ -37,6 +39,7 @@ class View(NamedTuple):
         pixels: (n, 2) positions on the sensor; meaningful where `inside` or near it.
         inside: (n,) lamps whose centre falls on the sensor.
         flakes: marine snow, None without.
+        beam: what is seen of the rotating beacon beside its lamp, None without one.
     """
 
     T_world_camera: Array
@@ -44,6 +47,7 @@ class View(NamedTuple):
     pixels: Array
     inside: BoolArray
     flakes: Flakes | None
+    beam: Beam | None = None
 
 
 class LitScene:
@@ -57,6 +61,7 @@ class LitScene:
         nuisance: NuisanceCfg,
         cfg: ImagingCfg,
         T_world_station: Array,
+        rotating: RotatingBeaconCfg | None = None,
         *,
         seen_from: str = "front",
         lamp: LampCfg | None = None,
@@ -71,6 +76,7 @@ class LitScene:
             nuisance: what makes the scene hard.
             cfg: the camera as an instrument.
             T_world_station: (4, 4) pose of the station frame.
+            rotating: the station's rotating beacon, if it has one.
             seen_from: "front" for a funnel along x, "above" for a platform whose lights shine up.
             lamp: the vehicle's own lamps beside the camera, None for none.
             dead_lights: names of the station's lights that do not shine.
@@ -79,6 +85,10 @@ class LitScene:
             ConfigError: a dead light that the station does not have.
         """
         self.camera, self.water, self.layout, self.nuisance, self.cfg = camera, water, layout, nuisance, cfg
+        self.rotating: RotatingLight | None = None
+        """The rotating beacon; its lamp comes right after those of the layout."""
+        self._own = (*layout.beacons, *((_lamp_of(rotating),) if rotating is not None else ()))
+        self._rotating_cfg = rotating
         self.T_world_station = T_world_station
         self._T_station_world = invert(T_world_station)
         self._seen_from = seen_from
@@ -102,9 +112,9 @@ class LitScene:
         self.sensor_rng, self._streams = nuisance_streams(rng)
         self.snow.reset(self._streams["marine_snow"])
         strangers = self._strangers(self._streams["interfering_lights"])
-        if strangers or self.lights.count != self.lights.station_count:
+        n = len(self._own)
+        if strangers or self.lights.count != n:
             self._set_lights(strangers)
-        n = self.lights.station_count
         self._log = self._streams["flicker"].standard_normal(n)
         self._dark_until = np.full(n, -np.inf)
         self._occluded_until = np.full(n, -np.inf)
@@ -133,17 +143,33 @@ class LitScene:
             self._scale = (gain, SensorScale(self.cfg, gain))
         return self._scale[1]
 
-    def look(self, T_world_body: Array, time_s: float) -> View:
-        """Light at the camera now; advances flicker and occlusions to `time_s`."""
+    def look(
+        self, T_world_body: Array, time_s: float, station_time_s: float | None = None, exposure_s: float = 0.0
+    ) -> View:
+        """Light at the camera now; advances flicker and occlusions to `time_s`.
+
+        Args:
+            T_world_body: (4, 4) pose of the vehicle.
+            time_s: time of mid exposure by the vehicle's clock.
+            station_time_s: the same by the station's clock, which turns the rotating beacon; None: the two agree.
+            exposure_s: time over which the rotating beacon's light is averaged.
+        """
         T_world_camera = T_world_body @ self.camera.T_body_camera
-        received = self.lights.received(self._T_station_world @ T_world_camera)
+        T_station_camera = self._T_station_world @ T_world_camera
+        received = self.lights.received(T_station_camera)
         if len(self.dead):
             received.core_w_m2[self._unlit] = 0.0
             received.halo_w_m2[self._unlit] = 0.0
+        beam = None
+        if self.rotating is not None:
+            turned_s = time_s if station_time_s is None else station_time_s
+            beam = self.rotating.shine(received, T_station_camera[:3, :3], turned_s, exposure_s)
         if self._fluctuates:
             factor = self._fluctuate(time_s, received.range_m)[self._source]
             received.core_w_m2[:] *= factor
             received.halo_w_m2[:] *= factor
+            if self.rotating is not None and beam is not None:
+                beam.light_w_m2[:] *= factor[self.rotating.lamp]
         if self._mirrors:
             self._mirror(received, T_world_camera)
         pixels, inside = self.lens.locate(received.ray_camera)
@@ -151,7 +177,7 @@ class LitScene:
         if self.nuisance.marine_snow != "none":
             day = float(self.daylight_w_m2(-T_world_camera[2, 3])[0])
             flakes = self.snow.flakes(T_world_camera, received, day)
-        return View(T_world_camera, received, pixels, inside, flakes)
+        return View(T_world_camera, received, pixels, inside, flakes, beam)
 
     def flake_channel(self, view: View) -> Array:
         """(3,) electrons per second for 1 W/m² of light from flakes: the mean colour of what lights them."""
@@ -159,11 +185,17 @@ class LitScene:
         return light @ self.lights.electrons_per_j / float(light.sum()) * self.lens.aperture_m2
 
     def _set_lights(self, strangers: tuple[BeaconCfg, ...]) -> None:
-        mirrored = [k for k, beacon in enumerate(self.layout.beacons) if beacon.role != "entrance"]
+        self.lights = LightSet(self.layout, self.water, self._own[len(self.layout.beacons) :])
+        mirrored = [k for k, beacon in enumerate(self._own) if beacon.role != "entrance"]
         images = self._images(mirrored) if self._mirrors else ()
-        self.lights = LightSet(self.layout, self.water, (*strangers, *images), funnel=self._seen_from == "front")
+        fixed = len(self.layout.beacons)
+        extra = (*self._own[fixed:], *strangers, *images)
+        self.lights = LightSet(self.layout, self.water, extra, funnel=self._seen_from == "front")
         self._image_slice = slice(self.lights.count - len(images), self.lights.count)
-        own = self.lights.station_count
+        own = len(self._own)
+        if self._rotating_cfg is not None:
+            image = self.lights.count - 1 if images else None
+            self.rotating = RotatingLight(self._rotating_cfg, self.lights, self.water, fixed, image)
         # Whose fluctuation each light shares: its own, none (the last entry), or that of the lamp it mirrors.
         source = [*range(own), *(own for _ in strangers), *mirrored[: len(images)]]
         self._source = np.array(source, dtype=np.int64)
@@ -191,7 +223,7 @@ class LitScene:
         rotation, origin = self.T_world_station[:3, :3], self.T_world_station[:3, 3]
         flip = np.array([1.0, 1.0, -1.0])
         for k in mirrored:
-            beacon, position, axis = self.layout.beacons[k], self.layout.positions_m[k], self.layout.axes[k]
+            beacon, position, axis = self._own[k], self.lights.positions_m[k], self.lights.axes[k]
             place = rotation.T @ (flip * (rotation @ position + origin) - origin)
             way = rotation.T @ (flip * (rotation @ axis))
             images.append(
@@ -222,7 +254,7 @@ class LitScene:
     def _fluctuate(self, time_s: float, range_m: Array) -> Array:
         """(station's lamps + 1,) factors on their light; the last entry is 1."""
         flicker, snow = self.nuisance.flicker_level, self.nuisance.snow_level
-        n = self.lights.station_count
+        n = len(self._own)
         step = 0.0 if self._last_s is None else max(time_s - self._last_s, 0.0)
         self._last_s = time_s
         stream = self._streams["flicker"]
@@ -250,6 +282,20 @@ def _stranger_below(index: int, power_w: float, rng: np.random.Generator) -> Bea
     place = (float(distance * math.cos(bearing)), float(distance * math.sin(bearing)), float(rng.uniform(-0.2, 1.0)))
     nm = 450.0 if rng.random() < 0.5 else 530.0
     return BeaconCfg(f"stranger{index}", "array", place, (0.0, 0.0, 1.0), nm, power_w, 0.35, 90.0)
+
+
+def _lamp_of(cfg: RotatingBeaconCfg) -> BeaconCfg:
+    """The rotating beacon's lamp; its axis is a place holder, `RotatingLight` says where it shines."""
+    return BeaconCfg(
+        "rotating",
+        "long_range",
+        cfg.position_m,
+        (1.0, 0.0, 0.0),
+        cfg.wavelength_nm,
+        cfg.power_w,
+        cfg.efficiency,
+        cfg.divergence_deg,
+    )
 
 
 def _fresnel_from_water(cosine: Array) -> Array:

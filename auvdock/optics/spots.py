@@ -55,8 +55,8 @@ class SpotModel:
         self._per_log2 = 0.5 / math.log(self.radii_px[1] / self.radii_px[0])
         self._starts = np.arange(0, lights.count * _RADII, _RADII)
         table = halo_table(water.scattering_angle_rad)
-        self._table = table
-        self._rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
+        self.table = table
+        self.rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
         self._lens_sigma2 = cfg.lens_sigma_px**2
         self._lamp_px_m2 = (cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2
         self._channel = lights.electrons_per_j * lens.aperture_m2
@@ -71,9 +71,9 @@ class SpotModel:
         core, halo, range_m = received.core_w_m2[index], received.halo_w_m2[index], received.range_m[index]
         sigma2 = self._lamp_px_m2 / (range_m * range_m)
         sigma2 += self._lens_sigma2
-        row, weight = self._table.row_of(received.scattering_depth[index])
-        lower = self._rows[row]
-        profile = self._rows[row + 1]
+        row, weight = self.table.row_of(received.scattering_depth[index])
+        lower = self.rows[row]
+        profile = self.rows[row + 1]
         profile -= lower
         profile *= weight[:, None]
         profile += lower

@@ -31,7 +31,7 @@ def inner_radius_m(station: ConicalStationCfg, x_m: float) -> float:
 
 def station_geoms(station: ConicalStationCfg) -> list[str]:
     """MJCF geom elements of funnel, tube, end stop, posts, lamps and floor."""
-    geoms = [*_funnel(station), *_tube(station), *_posts(station), *_lamps(station)]
+    geoms = [*_funnel(station), *_tube(station), *_posts(station), *_lamps(station), *_rotating(station)]
     floor_z = -station.depth_m - station.floor_below_m
     geoms.append(
         f'<geom name="floor" type="plane" pos="0 0 {floor_z:.9g}" size="60 60 1" material="floor" group="0" '
@@ -152,3 +152,22 @@ def _lamps(station: ConicalStationCfg) -> list[str]:
             f'size="{size}" material="{material}" group="1" contype="0" conaffinity="0"/>'
         )
     return lamps
+
+
+def _rotating(station: ConicalStationCfg) -> list[str]:
+    """The rotating beacon's lantern (a clear cylinder of 12 cm, 16 cm high) and the post that carries it."""
+    if station.rotating is None:
+        return []
+    x, y, z = station.rotating.position_m
+    lantern = (
+        f'<geom name="lamp_rotating" type="cylinder" pos="{x:.9g} {y:.9g} {z - station.depth_m:.9g}" '
+        f'size="0.06 0.08" material="lamp_blue" group="1" contype="0" conaffinity="0"/>'
+    )
+    reach = math.hypot(y, z)
+    # Behind the tube there is no wall to stand on: the post starts at the axis' own height above the tube.
+    wall = inner_radius_m(station, min(x, 0.0)) + _WALL_M
+    if reach <= wall + 0.1:
+        return [lantern]
+    foot = wall / reach
+    start = (x, y * foot, z * foot - station.depth_m)
+    return [_rod("post_rotating", start, (x, y, z - 0.08 - station.depth_m), 0.02), lantern]

@@ -1,0 +1,109 @@
+"""What scattering makes of a narrow beam: the beam's profile convolved with the water's small-angle spread.
+
+A receiver at the angle θ from a beam's axis gets scattered light from rays that left the lamp at angles ψ from the line
+of sight. In homogeneous water the distribution of ψ is, by reciprocity, the point spread function h that a camera sees
+about a lamp (Mertens & Replogle 1977): the beam spread function. The light that left at ψ was sent out with f(θ - ψ),
+hence the scattered irradiance is that of a lamp that shines with f(θ) = 1 all around, times
+
+    g(θ) = ∫ f(θ - ψ) h(ψ) d²ψ,    ∫ h d²ψ = 1,
+
+where h is Wells' (1973) function for the path's b r (`optics.halo`). With f a Gaussian and the transfer function known,
+both sides are products in the frequency domain, and g is a Hankel transform that the Gaussian cuts off.
+
+The light that is scattered once, far from the axis, comes along the beam: that is what one sees of the beam from the
+side. `lead` is the mean of the component of ψ towards the beam, hence the angle that the light turned on its way.
+Angles are treated as plane, as Wells does; beyond some 60° that is an extrapolation.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import j0, j1
+
+from auvdock.core.arrays import Array
+from auvdock.optics.halo import wells_transfer
+
+__all__ = ["BeamSpread", "beam_spread"]
+
+_ROWS = 64
+_MIN_BR, _MAX_BR = 1e-3, 40.0
+_ANGLES = 192
+_FIRST_RAD = 1e-4
+_CUT = 34.0
+"""e^-34: where the Gaussian's transform counts as nothing."""
+
+
+class BeamSpread:
+    """g and lead over b r and angle, for one beam in one water.
+
+    Beyond b r = 40 the table's last row is kept; between its angles and rows it is linear in the logarithms.
+    """
+
+    def __init__(self, theta0_rad: float, half_angle_rad: float) -> None:
+        """Tabulate; some 50 ms.
+
+        Args:
+            theta0_rad: Wells' θ0 of the water.
+            half_angle_rad: θ_h of the profile f = exp(-ln 2 (θ / θ_h)²).
+        """
+        self._log_br = np.linspace(math.log(_MIN_BR), math.log(_MAX_BR), _ROWS)
+        angle = np.geomspace(_FIRST_RAD, math.pi, _ANGLES)
+        self._log_angle = np.log(angle)
+        width = math.log(2.0) / half_angle_rad**2
+        highest = math.sqrt(_CUT * width) / math.pi
+        nu, weights = _gauss(highest)
+        beam = math.pi / width * np.exp(-(math.pi**2) * nu**2 / width) * nu * weights
+        phase = 2.0 * math.pi * np.outer(nu, angle)
+        br = np.exp(self._log_br)
+        spread = np.array([wells_transfer(float(x), nu, theta0_rad) for x in br]) / -np.expm1(-br)[:, None]
+        slope = np.array([_slope(float(x), nu, theta0_rad) for x in br]) / -np.expm1(-br)[:, None]
+        share = (spread * beam) @ (2.0 * math.pi * j0(phase))
+        turned = (slope * beam) @ -j1(phase)
+        self._log_share = np.log(np.maximum(share, 1e-300))
+        self._lead = np.maximum(turned, 0.0) / np.maximum(share, 1e-300)
+
+    def share(self, br: Array, angle_rad: Array) -> Array:
+        """(n,) g at b r (n,) and angles (n,) from the beam's axis."""
+        return np.exp(self._between(self._log_share, br, angle_rad))
+
+    def lead_rad(self, br: Array, angle_rad: Array) -> Array:
+        """(n,) mean angle from the line of sight, towards the beam, at which the light left the lamp."""
+        return self._between(self._lead, br, angle_rad)
+
+    def _between(self, table: Array, br: Array, angle_rad: Array) -> Array:
+        row, up = _place(np.log(np.clip(br, _MIN_BR, _MAX_BR)), self._log_br)
+        column, right = _place(np.log(np.clip(angle_rad, _FIRST_RAD, math.pi)), self._log_angle)
+        low = table[row, column] * (1.0 - right) + table[row, column + 1] * right
+        high = table[row + 1, column] * (1.0 - right) + table[row + 1, column + 1] * right
+        return low * (1.0 - up) + high * up
+
+
+@lru_cache(maxsize=16)
+def beam_spread(theta0_rad: float, half_angle_rad: float) -> BeamSpread:
+    """The table for one beam in one water, made once."""
+    return BeamSpread(theta0_rad, half_angle_rad)
+
+
+def _gauss(highest: float) -> tuple[Array, Array]:
+    """Nodes and weights for [0, highest]: panels of 32 nodes, ten or more per turn of J(2π ν θ) at θ = π."""
+    panels = max(12, math.ceil(10.0 * highest * math.pi / 32.0))
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    width = highest / panels
+    nu = (np.arange(panels)[:, None] + 0.5 * (nodes + 1.0)) * width
+    return nu.ravel(), np.tile(0.5 * width * weights, panels)
+
+
+def _slope(br: float, nu: Array, theta0_rad: float) -> Array:
+    """d/dν of `wells_transfer`."""
+    k = 2.0 * math.pi * theta0_rad * nu
+    mean = -np.expm1(-k) / k
+    return 2.0 * math.pi * theta0_rad * br * np.exp(br * (mean - 1.0)) * (k * np.exp(-k) + np.expm1(-k)) / k**2
+
+
+def _place(value: Array, grid: Array) -> tuple[Array, Array]:
+    place = (value - grid[0]) / (grid[1] - grid[0])
+    index = np.minimum(place.astype(np.int64), len(grid) - 2)
+    return index, place - index
