@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import j0, j1
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, IntArray
 from auvdock.optics.halo import wells_transfer
 
 __all__ = ["BeamSpread", "beam_spread"]
@@ -103,7 +103,7 @@ def _slope(br: float, nu: Array, theta0_rad: float) -> Array:
     return 2.0 * math.pi * theta0_rad * br * np.exp(br * (mean - 1.0)) * (k * np.exp(-k) + np.expm1(-k)) / k**2
 
 
-def _place(value: Array, grid: Array) -> tuple[Array, Array]:
+def _place(value: Array, grid: Array) -> tuple[IntArray, Array]:
     place = (value - grid[0]) / (grid[1] - grid[0])
     index = np.minimum(place.astype(np.int64), len(grid) - 2)
     return index, place - index

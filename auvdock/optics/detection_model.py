@@ -123,12 +123,12 @@ class Flash(NamedTuple):
     """The rotating beacon as a candidate.
 
     Attributes:
-        index: its place among the candidates.
+        place: index among the candidates.
         half_px: (2,) half sides of the box about the part brighter than half of the peak.
         shift_px: (2,) from the lamp to the middle of that box.
     """
 
-    index: int
+    place: int
     half_px: Array
     shift_px: Array
 
@@ -200,7 +200,7 @@ def draw_detections(
     odds **= model.slope
     flash, ways = seen.flash, model.flash or _FLASH
     if flash is not None:
-        odds[flash.index] = (ways.contrast_50_dn / max(float(contrast[flash.index]), 1e-3)) ** ways.slope
+        odds[flash.place] = (ways.contrast_50_dn / max(float(contrast[flash.place]), 1e-3)) ** ways.slope
     odds += 1.0
     hit = (chance[0] * odds < model.ceiling) & (contrast > 1e-3)
     index = hit.nonzero()[0]
@@ -219,11 +219,11 @@ def draw_detections(
     score = snr / (snr + 10.0)
     class_id = (merged.red[index] != (chance[1, index] < model.wrong_colour)).astype(np.int64)
     half = np.maximum(merged.radius_px[index], width)[:, None]
-    if flash is not None and hit[flash.index]:
-        place = int(np.flatnonzero(index == flash.index)[0])
+    if flash is not None and hit[flash.place]:
+        place = int(np.flatnonzero(index == flash.place)[0])
         half = np.repeat(half, 2, axis=1)
         half[place] = np.maximum(half[place], ways.box_scale * flash.half_px)
-        noise_over_contrast = 10.0 * float(merged.noise_dn[flash.index] / contrast[flash.index])
+        noise_over_contrast = 10.0 * float(merged.noise_dn[flash.place] / contrast[flash.place])
         spread_px = ways.centre_spread * noise_over_contrast * float(half[place].mean())
         centre[place] += ways.centre_shift * flash.shift_px + spread_px * rng.standard_normal(2)
     flux = None

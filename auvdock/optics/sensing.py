@@ -191,7 +191,7 @@ def _with_flash(
         contrast[members[members != lead]] = 0.0
         if contrast[lead] < shape.contrast_dn:
             contrast[lead] = shape.contrast_dn
-            shape = shape._replace(flash=shape.flash._replace(index=lead))
+            shape = shape._replace(flash=shape.flash._replace(place=lead))
     return seen._replace(pixels=pixels, contrast_dn=contrast, surround_dn=surround, flash=shape.flash)
 
 
