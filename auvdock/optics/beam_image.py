@@ -69,7 +69,7 @@ class BeamImage:
         radiance = self._blobs(beam, size, row, weight, scattered, blob, floor)
         sharp = self._ribbon(beam, ribbon * beam.light_w_m2, floor)
         if sharp is not None:
-            radiance = sharp if radiance is None else radiance + sharp
+            radiance = sharp if radiance is None else np.add(radiance, sharp, dtype=np.float32)
         if radiance is not None:
             radiance *= self._solid_angle
             image += radiance[:, :, None] * (self._channel * exposure_s).astype(np.float32)
@@ -145,7 +145,7 @@ class BeamImage:
         np.exp(shown, out=shown)
         shown *= along.astype(np.float32).take(entry)
         shown[before] = 0.0
-        return shown.reshape(self._shape)
+        return np.asarray(shown.reshape(self._shape), dtype=np.float32)
 
     def _blend(self, rows: Array, row: IntArray, weight: Array, log_angle: Array) -> Array:
         """(k,) values of a table over (row, log angle), linear in both."""
