@@ -20,7 +20,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.marine import flip_matrix, flip_twist, flip_vector
 from auvdock.core.strict import load_toml
 
-__all__ = ["ActuatorCfg", "MountCfg", "VehicleCfg", "load_vehicle"]
+__all__ = ["ActuatorCfg", "HullPartCfg", "MountCfg", "VehicleCfg", "load_vehicle"]
 
 _ROWS = {"X": 0, "Y": 1, "Z": 2, "K": 3, "M": 4, "N": 5}
 _COLUMNS = {"u": 0, "v": 1, "w": 2, "p": 3, "q": 4, "r": 5}
@@ -90,6 +90,31 @@ class MountCfg:
 
 
 @dataclass(frozen=True)
+class HullPartCfg:
+    """A solid part of the vehicle: what touches a station and what is drawn; marine axes."""
+
+    name: str
+    """Unique name."""
+    shape: str
+    """"box", or "capsule" or "cylinder" lying along x."""
+    position_m: tuple[float, float, float]
+    """Centre from the origin."""
+    size_m: tuple[float, float, float]
+    """Full extent along x, y and z; round parts have their diameter twice."""
+
+    def __post_init__(self) -> None:
+        """Check shape and size."""
+        if self.shape not in ("box", "capsule", "cylinder"):
+            raise ConfigError(f"hull.{self.name}.shape", self.shape, "'box', 'capsule' or 'cylinder'")
+        if not all(size > 0.0 for size in self.size_m):
+            raise ConfigError(f"hull.{self.name}.size_m", self.size_m, "three lengths above 0 m")
+        if self.shape != "box" and self.size_m[1] != self.size_m[2]:
+            raise ConfigError(f"hull.{self.name}.size_m", self.size_m, "the same diameter along y and z")
+        if self.shape == "capsule" and self.size_m[0] <= self.size_m[1]:
+            raise ConfigError(f"hull.{self.name}.size_m", self.size_m, "a capsule longer than thick")
+
+
+@dataclass(frozen=True)
 class VehicleCfg:
     """Everything that is published of a vehicle and that its pilot may know."""
 
@@ -122,6 +147,22 @@ class VehicleCfg:
     belly_camera: MountCfg
     seat_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Middle of the round that comes to rest in a landing station's guides, marine axes: of the hull, or of a keel."""
+    hull: tuple[HullPartCfg, ...] = ()
+    """Solid parts; none stands for one capsule of `radius_m` from `tail_x_m` to `nose_x_m`, with fins at its tail."""
+
+    @property
+    def hull_parts(self) -> tuple[HullPartCfg, ...]:
+        """The solid parts, the one capsule spelt out."""
+        if self.hull:
+            return self.hull
+        middle_m, length_m = 0.5 * (self.nose_x_m + self.tail_x_m), self.nose_x_m - self.tail_x_m
+        size_m = (length_m, 2.0 * self.radius_m, 2.0 * self.radius_m)
+        return (HullPartCfg("hull", "capsule", (middle_m, 0.0, 0.0), size_m),)
+
+    @cached_property
+    def seat_body_m(self) -> Array:
+        """(3,) `seat_m` in package body axes."""
+        return flip_vector(np.array(self.seat_m))
 
     @cached_property
     def added_mass_body(self) -> Array:

@@ -7,16 +7,13 @@ from auvdock.core.stations import StationCfg
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.sim.conical_dock import ConicalDock
 from auvdock.sim.dock import Dock
+from auvdock.sim.landing_dock import LandingDock
 
 __all__ = ["make_dock"]
 
 
 def make_dock(station: StationCfg, vehicle: VehicleCfg) -> Dock:
-    """The station in the simulator.
-
-    Raises:
-        TypeError: a station of a kind that the simulator does not know.
-    """
+    """The station in the simulator."""
     if isinstance(station, ConicalStationCfg):
         return ConicalDock(station, vehicle)
-    raise TypeError(f"no dock for {type(station).__name__}")
+    return LandingDock(station, vehicle)

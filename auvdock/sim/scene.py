@@ -7,7 +7,7 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.marine import flip_vector
 from auvdock.core.transforms import quat_wxyz_from_rotation
-from auvdock.core.vehicle import MountCfg, VehicleCfg
+from auvdock.core.vehicle import HullPartCfg, MountCfg, VehicleCfg
 from auvdock.sim.dock import Dock
 from auvdock.sim.hydrodynamics import GRAVITY_M_S2
 from auvdock.sim.mj import MjModel, mujoco
@@ -23,6 +23,7 @@ _CONTACT_TIME_S = 0.03
 """Time constant of contacts: over three physics steps at 120 Hz (MuJoCo asks for two), a polymer lining's give."""
 _CAMERA_FOVY_DEG = 50.0
 """Of the named cameras, which are for looking at the scene; perception's camera brings its own intrinsics."""
+_SKIN = 'material="hull" group="2" condim="3" friction="0 0 0" mass="0"'
 _FIN_SPAN_M = 0.055
 _FIN_CHORD_M = 0.075
 
@@ -96,16 +97,7 @@ def scene_xml(vehicle: VehicleCfg, dock: Dock, dt_s: float) -> str:
 
 def _vehicle_body(vehicle: VehicleCfg, position_m: tuple[float, float, float]) -> str:
     quat, moments = _principal_inertia(vehicle)
-    radius = vehicle.radius_m
-    nose, tail = vehicle.nose_x_m, vehicle.tail_x_m
-    fin_x = tail + 0.08
-    fins = "\n      ".join(
-        f'<geom name="fin_{name}" type="box" pos="{fin_x:.9g} {y * (radius + 0.5 * _FIN_SPAN_M):.9g} '
-        f'{z * (radius + 0.5 * _FIN_SPAN_M):.9g}" size="{0.5 * _FIN_CHORD_M} '
-        f'{0.5 * _FIN_SPAN_M if y else 0.004} {0.5 * _FIN_SPAN_M if z else 0.004}" material="fin" group="2" '
-        f'contype="0" conaffinity="0" mass="0"/>'
-        for name, y, z in (("port", 1, 0), ("starboard", -1, 0), ("top", 0, 1), ("bottom", 0, -1))
-    )
+    parts = "\n      ".join(_hull(vehicle) if not vehicle.hull else [_part(part) for part in vehicle.hull])
     place = " ".join(f"{part:.9g}" for part in position_m)
     com = " ".join(f"{part:.12g}" for part in vehicle.centre_of_gravity_body_m)
     cameras = "\n      ".join(
@@ -114,12 +106,36 @@ def _vehicle_body(vehicle: VehicleCfg, position_m: tuple[float, float, float]) -
     return f"""<body name="{VEHICLE}" pos="{place}">
       <freejoint name="vehicle_free"/>
       <inertial pos="{com}" mass="{vehicle.mass_kg:.12g}" quat="{quat}" diaginertia="{moments}"/>
-      <geom name="hull" type="capsule" fromto="{tail + radius:.9g} 0 0 {nose - radius:.9g} 0 0" size="{radius:.9g}"
-          material="hull" group="2" condim="3" friction="0 0 0" mass="0"/>
-      {fins}
+      {parts}
       {cameras}
-      <site name="nose" pos="{nose:.9g} 0 0" size="0.01" group="3"/>
+      <site name="nose" pos="{vehicle.nose_x_m:.9g} 0 0" size="0.01" group="3"/>
     </body>"""
+
+
+def _hull(vehicle: VehicleCfg) -> list[str]:
+    """A torpedo: one capsule, and fins that are only drawn."""
+    radius, tail = vehicle.radius_m, vehicle.tail_x_m
+    fin_x = tail + 0.08
+    fins = [
+        f'<geom name="fin_{name}" type="box" pos="{fin_x:.9g} {y * (radius + 0.5 * _FIN_SPAN_M):.9g} '
+        f'{z * (radius + 0.5 * _FIN_SPAN_M):.9g}" size="{0.5 * _FIN_CHORD_M} '
+        f'{0.5 * _FIN_SPAN_M if y else 0.004} {0.5 * _FIN_SPAN_M if z else 0.004}" material="fin" group="2" '
+        f'contype="0" conaffinity="0" mass="0"/>'
+        for name, y, z in (("port", 1, 0), ("starboard", -1, 0), ("top", 0, 1), ("bottom", 0, -1))
+    ]
+    ends = f"{tail + radius:.9g} 0 0 {vehicle.nose_x_m - radius:.9g} 0 0"
+    return [f'<geom name="hull" type="capsule" fromto="{ends}" size="{radius:.9g}"\n          {_SKIN}/>', *fins]
+
+
+def _part(part: HullPartCfg) -> str:
+    x, y, z = (float(coordinate) for coordinate in flip_vector(np.array(part.position_m)))
+    length, width, height = part.size_m
+    if part.shape == "box":
+        size = f'pos="{x:.9g} {y:.9g} {z:.9g}" size="{0.5 * length:.9g} {0.5 * width:.9g} {0.5 * height:.9g}"'
+    else:
+        half = 0.5 * (length - (width if part.shape == "capsule" else 0.0))
+        size = f'fromto="{x - half:.9g} {y:.9g} {z:.9g} {x + half:.9g} {y:.9g} {z:.9g}" size="{0.5 * width:.9g}"'
+    return f'<geom name="{part.name}" type="{part.shape}" {size} {_SKIN}/>'
 
 
 def _principal_inertia(vehicle: VehicleCfg) -> tuple[str, str]:
