@@ -112,6 +112,9 @@ class RelativeFilter:
         self._still = np.eye(4)
         self._process = np.diag([walk, walk, walk, turn])
         self._floor = np.diag([cfg.position_floor_m**2] * 3 + [cfg.rotation_floor_rad**2] * 3)
+        self._sensitivity = np.zeros((6, 4))
+        self._sensitivity[:3, :3] = np.eye(3)
+        self._max_trace = 1.0 + 2.0 * math.cos(cfg.max_rotation_mismatch_rad)
 
     def predict(self, state: RelativeState, senses: Senses) -> RelativeState:
         """Dead reckoning over one period: ṗ = R_station_body (v + ω × r_camera); covariance F P Fᵀ + Q."""
@@ -172,21 +175,25 @@ class RelativeFilter:
         """
         cfg = self._cfg
         T, cov = pose.T_station_camera, pose.covariance
-        if not (np.isfinite(T).all() and np.isfinite(cov).all()):
+        if not math.isfinite(float(np.vdot(T, T)) + float(np.vdot(cov, cov))):
             return state
         predicted = np.array(self._R_station_body(state.axis_yaw_rad, senses)).reshape(3, 3) @ self._R_body_camera
         e: list[float] = (predicted.T @ T[:3, :3]).ravel().tolist()
         sine = (0.5 * (e[7] - e[5]), 0.5 * (e[2] - e[6]), 0.5 * (e[3] - e[1]))
         x, y, z = state.camera_m
         px, py, pz = T[:3, 3].tolist()
-        if e[0] + e[4] + e[8] > 1.0 + 2.0 * math.cos(cfg.max_rotation_mismatch_rad):
+        if e[0] + e[4] + e[8] > self._max_trace:
             innovation = np.array([px - x, py - y, pz - z, *sine])
-            sensitivity = np.zeros((6, 4))
-            sensitivity[0, 0] = sensitivity[1, 1] = sensitivity[2, 2] = 1.0
-            sensitivity[3:, 3] = -predicted[2]
+            sensitivity = self._sensitivity.copy()
+            np.negative(predicted[2], out=sensitivity[3:, 3])
             HP = sensitivity @ state.covariance
-            spread = HP @ sensitivity.T + cfg.inflation * cov + self._floor
-            gain = _solve(spread, np.column_stack([HP, innovation]))
+            spread = HP @ sensitivity.T
+            spread += cfg.inflation * cov
+            spread += self._floor
+            right = np.empty((6, 5), order="F")
+            right[:, :4] = HP
+            right[:, 4] = innovation
+            gain = _solve(spread, right)
             if float(innovation @ gain[:, 4]) < cfg.gate:
                 dx, dy, dz, turn = (HP.T @ gain[:, 4]).tolist()
                 covariance = state.covariance - HP.T @ gain[:, :4]
@@ -266,8 +273,11 @@ class RelativeFilter:
 
 
 def _solve(symmetric: Array, right: Array) -> Array:
-    """Solution of a symmetric positive definite system by Cholesky, straight from LAPACK: a third of NumPy's time."""
-    _, solution, info = _lapack.dposv(symmetric, right)
+    """Solution of a symmetric positive definite system by Cholesky, straight from LAPACK: a third of NumPy's time.
+
+    `right` is in Fortran's order and is overwritten.
+    """
+    _, solution, info = _lapack.dposv(symmetric, right, overwrite_b=1)
     return solution if info == 0 else np.zeros_like(right)
 
 

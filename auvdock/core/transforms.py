@@ -106,10 +106,9 @@ def rotation_from_euler_zyx(roll_rad: float, pitch_rad: float, yaw_rad: float) -
 
 def euler_zyx_from_rotation(rotation: Array) -> tuple[float, float, float]:
     """(roll, pitch, yaw) in radians of a (3, 3) rotation; inverse of `rotation_from_euler_zyx`."""
-    pitch = -math.asin(max(-1.0, min(1.0, float(rotation[2, 0]))))
-    roll = math.atan2(float(rotation[2, 1]), float(rotation[2, 2]))
-    yaw = math.atan2(float(rotation[1, 0]), float(rotation[0, 0]))
-    return roll, pitch, yaw
+    (r00, _, _), (r10, _, _), (r20, r21, r22) = rotation.tolist()
+    pitch = -math.asin(max(-1.0, min(1.0, r20)))
+    return math.atan2(r21, r22), pitch, math.atan2(r10, r00)
 
 
 def quat_wxyz_from_euler_zyx(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Array:

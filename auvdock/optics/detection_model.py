@@ -202,7 +202,9 @@ def draw_detections(
     if flash is not None:
         odds[flash.place] = (ways.contrast_50_dn / max(float(contrast[flash.place]), 1e-3)) ** ways.slope
     odds += 1.0
-    hit = (chance[0] * odds < model.ceiling) & (contrast > 1e-3)
+    odds *= chance[0]
+    hit = odds < model.ceiling
+    hit &= contrast > 1e-3
     index = hit.nonzero()[0]
     index = index[(-contrast[index]).argsort(kind="stable")]
     strength = contrast[index]
@@ -212,9 +214,9 @@ def draw_detections(
     spread = width * (model.centre_at_100 * 1e4 / strength)
     spread *= spread
     spread += model.centre_floor_px**2
-    centre = noise[index]
-    centre *= np.sqrt(spread)[:, None]
-    centre += merged.pixels[index]
+    centre = noise.take(index, 0)
+    centre *= np.sqrt(spread, out=spread)[:, None]
+    centre += merged.pixels.take(index, 0)
     snr *= model.score_gain
     score = snr / (snr + 10.0)
     class_id = (merged.red[index] != (chance[1, index] < model.wrong_colour)).astype(np.int64)
@@ -232,8 +234,8 @@ def draw_detections(
         light = merged.light_e_s[index] * np.exp(ways.flux_spread * draws[0])
         flux = np.maximum(light + merged.light_noise_e_s[index] * draws[1], 0.0)
     xyxy = np.empty((len(index), 4))
-    xyxy[:, :2] = centre - half
-    xyxy[:, 2:] = centre + half
+    np.subtract(centre, half, out=xyxy[:, :2])
+    np.add(centre, half, out=xyxy[:, 2:])
     if alarms:
         ghosts = seen.pixels[rng.integers(0, m, alarms)] + rng.normal(0.0, _HAZE_PX, (alarms, 2))
         ghosts = np.clip(ghosts, -0.5, np.array(size_px) - 0.5)

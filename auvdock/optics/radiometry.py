@@ -84,8 +84,12 @@ class LightSet:
         setback = self._rim_x - self.positions_m[:, 0]
         inside = np.sum((self.positions_m[:, 1:] - self._rim_centre) ** 2, axis=1) < self._rim_radius2
         self._recessed = np.flatnonzero(((setback > 0.05) & inside & funnel)[: self.station_count])
-        self._setback = setback[self._recessed]
-        self._recessed_yz = self.positions_m[self._recessed, 1:] - self._rim_centre
+        places = self.positions_m[self._recessed, 1:] - self._rim_centre
+        # In plain floats, since there are few of them.
+        self._behind: list[tuple[int, float, float, float]] = [
+            (int(index), float(setback[index]), float(y), float(z))
+            for index, (y, z) in zip(self._recessed, places, strict=True)
+        ]
 
     def received(self, T_station_camera: Array) -> Received:
         """Core and halo irradiance of every lamp at a camera pose (4, 4)."""
@@ -105,12 +109,13 @@ class LightSet:
         total *= self.peak_w_sr
         total /= r2
         ahead = float(camera[0]) - self._rim_x
-        if ahead > 0.0 and len(self._recessed):
-            share = (self._setback / (self._setback + ahead))[:, None]
-            crossing = self._recessed_yz * (1.0 - share) + (camera[1:] - self._rim_centre) * share
-            hidden = (crossing * crossing) @ _ONES[:2] > self._rim_radius2
-            if hidden.any():
-                total[self._recessed[hidden]] = 0.0
+        if ahead > 0.0 and self._behind:
+            to_y, to_z = (camera[1:] - self._rim_centre).tolist()
+            for index, setback, y, z in self._behind:
+                share = setback / (setback + ahead)
+                across, up = y * (1.0 - share) + to_y * share, z * (1.0 - share) + to_z * share
+                if across * across + up * up > self._rim_radius2:
+                    total[index] = 0.0
         depth = self.scattering_per_m * r
         core = total * np.exp(-depth)
         return Received(ray @ T_station_camera[:3, :3], r, depth, core, total - core)

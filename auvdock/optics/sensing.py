@@ -108,7 +108,7 @@ def candidates_in_view(
         gain: analogue gain.
         background_px: radius at which the detector takes a flash's halo for background.
     """
-    pixels = view.pixels[view.inside]
+    pixels = view.pixels.compress(view.inside, 0)
     scale = lit.scale(gain)
     model = lit.spots
     area = model.saturated_area_px2(spots, scale.saturated_e / exposure_s)
@@ -117,23 +117,26 @@ def candidates_in_view(
     best = channel.argmax(axis=1)
     gap2 = squared_distances(pixels)
     level = model.at_distance(spots, gap2)
-    level *= channel.T[best]
-    around = level.sum(axis=1)
+    level *= channel.T.take(best, 0)
+    around = np.add.reduce(level, axis=1)
     own = level.diagonal().copy()
     around -= own
     if lit.nuisance.daylight != "none":
         veil = lit.veil_e_s(-float(view.T_world_camera[2, 3])) * exposure_s
         around += veil[best]
         share += veil_share(veil, scale.saturated_e)
-    codes = np.array((around + own, around))
-    codes = np.minimum(scale.codes(codes), 255.0)
+    electrons = np.empty((2, len(own)))
+    bright = np.add(around, own, out=electrons[0])
+    electrons[1] = around
+    codes = scale.codes(electrons)
+    np.minimum(codes, 255.0, out=codes)
     contrast = codes[0] - codes[1]
     seen = Candidates(
         pixels,
         contrast,
         codes[1],
-        scale.noise_dn(around + own),
-        np.sqrt(area.max(axis=1) * (1.0 / math.pi)),
+        scale.noise_dn(bright),
+        np.sqrt(np.maximum.reduce(area, axis=1) * (1.0 / math.pi)),
         spots.sigma_px,
         own,
         gap2,

@@ -62,7 +62,9 @@ class SensorScale:
         """Standard deviation of the code at a signal in electrons, quantisation included."""
         if self._linear:
             return np.sqrt((electrons + self._read2) * (255.0 / self.full_scale_e) ** 2 + 1.0 / 12.0)
-        return np.full(electrons.shape, self._noise_dn)
+        noise = np.empty(electrons.shape)
+        noise.fill(self._noise_dn)
+        return noise
 
 
 class Sensor:

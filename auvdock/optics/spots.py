@@ -72,8 +72,9 @@ class SpotModel:
         sigma2 = self._lamp_px_m2 / (range_m * range_m)
         sigma2 += self._lens_sigma2
         row, weight = self.table.row_of(received.scattering_depth[index])
-        lower = self.rows[row]
-        profile = self.rows[row + 1]
+        lower = self.rows.take(row, 0)
+        row += 1
+        profile = self.rows.take(row, 0)
         profile -= lower
         profile *= weight[:, None]
         profile += lower
@@ -82,7 +83,7 @@ class SpotModel:
         np.exp(gauss, out=gauss)
         gauss *= (core / (_TWO_PI * sigma2))[:, None]
         profile += gauss
-        return Spots(core, halo, np.sqrt(sigma2), profile, self._channel[index])
+        return Spots(core, halo, np.sqrt(sigma2), profile, self._channel.take(index, 0))
 
     def saturated_area_px2(self, spots: Spots, level_e_s: float) -> Array:
         """(m, 3) area of each spot above a level in electrons per second, per channel; overlap is not counted."""
@@ -94,7 +95,7 @@ class SpotModel:
 
     def share(self, area_px2: Array) -> float:
         """Share of the image's samples that areas (m, 3) are."""
-        return float(area_px2.sum()) / self._samples
+        return float(np.add.reduce(area_px2, axis=None)) / self._samples
 
     def at_distance(self, spots: Spots, distance2_px2: Array) -> Array:
         """(m, m) irradiance per pixel at squared distances (m, m) from the lights along the second axis.

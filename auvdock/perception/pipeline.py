@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
-from auvdock.core.contracts import Detections, Percept, Proprioception, TrackView
+from auvdock.core.contracts import Detections, Percept, Proprioception
 from auvdock.core.errors import ConfigError
 from auvdock.perception.association import Association
 from auvdock.perception.authentication import AuthenticationCfg
@@ -18,7 +18,7 @@ from auvdock.perception.prior import AttitudePrior
 from auvdock.perception.spatiotemporal import SpatiotemporalAssociation
 from auvdock.perception.tracker import LightTracker, TrackerCfg
 
-__all__ = ["ASSOCIATIONS", "BeaconPerception", "PerceptionCfg", "track_views"]
+__all__ = ["ASSOCIATIONS", "BeaconPerception", "PerceptionCfg"]
 
 ASSOCIATIONS = ("spatiotemporal", "hungarian_ransac")
 """Ways to tell which light is which beacon."""
@@ -91,22 +91,5 @@ class BeaconPerception:
             entrance=entrance,
             array_count=associated.array_count,
             detections=detections,
-            tracks=track_views(tracks),
+            tracks=tracks.views(),
         )
-
-
-def track_views(tracks: LightTracker) -> tuple[TrackView, ...]:
-    """The tracks as others may see them."""
-    centres = tracks.state[:, :2].copy()
-    rows = zip(
-        tracks.track_id.tolist(),
-        centres,
-        tracks.class_id.tolist(),
-        tracks.beacon_id.tolist(),
-        tracks.missed.tolist(),
-        strict=True,
-    )
-    return tuple(
-        TrackView(track_id, centre, class_id, beacon_id if beacon_id >= 0 else None, missed)
-        for track_id, centre, class_id, beacon_id, missed in rows
-    )

@@ -24,7 +24,7 @@ from auvdock.core.errors import ConfigError
 
 __all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "translation_from_rotation"]
 
-_potrf, _potrs = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
+_posv, _potrf, _potrs = get_lapack_funcs(("posv", "potrf", "potrs"), dtype=np.float64)
 _MAX_ITERATIONS = 20
 _DECREMENT = 1e-9
 _DECREMENT_TRACKED = 1e-4
@@ -64,7 +64,8 @@ class PnpSolution:
         rotation: (3, 3) R.
         translation_m: (3,) t.
         residual_px: (n,) distance between each observed light and its reprojection, to a hundredth of its σ.
-        normal: (6, 6) lower Cholesky factor of JᵀWJ over (rotation vector, t), prior included.
+        normal: (6, 6) lower Cholesky factor of JᵀWJ over (rotation vector, t), prior included; what stands above its
+            diagonal means nothing.
         attitude_error_rad: angle to the attitude prior.
         cost: χ² of the reprojection and of the attitude prior, if that is in use.
         solver: name of the solver.
@@ -83,8 +84,9 @@ class PnpSolution:
         """(4, 4) pose of the camera in the station frame: [Rᵀ, -Rᵀ t]."""
         transform = np.zeros((4, 4))
         transform[3, 3] = 1.0
-        transform[:3, :3] = self.rotation.T
-        transform[:3, 3] = -self.rotation.T @ self.translation_m
+        back = self.rotation.T
+        transform[:3, :3] = back
+        transform[:3, 3] = -back @ self.translation_m
         return transform
 
     def covariance(self) -> Array:
@@ -97,9 +99,10 @@ class PnpSolution:
         x, y, z = self.translation_m.tolist()
         skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         to = np.zeros((6, 6))
-        to[:3, :3] = -self.rotation.T @ skew @ left
-        to[:3, 3:] = -self.rotation.T
-        to[3:, :3] = -left
+        back = -self.rotation.T
+        to[:3, :3] = back @ skew @ left
+        to[:3, 3:] = back
+        np.negative(left, out=to[3:, :3])
         half, _ = _potrs(self.normal, to.T, lower=1)
         covariance = to @ half
         return 0.5 * (covariance + covariance.T)
@@ -205,10 +208,10 @@ class PnpSolver:
             pose, decrement = np.concatenate([start.rotation_vector, start.translation_m]), _DECREMENT_TRACKED
         else:
             pose, decrement = np.concatenate(start), _DECREMENT
-        weight = np.repeat(1.0 / sigma, 2)
-        target = np.ascontiguousarray(pixels).reshape(-1)
+        weight = (1.0 / sigma).repeat(2)
+        target = pixels.reshape(-1)
         prior_vector, prior_matrix = self._prior_terms(prior) if self._prior_weight else (np.zeros(3), np.zeros((3, 3)))
-        damping, cost, trial = 0.0, math.inf, pose
+        damping, cost, trial, factor = 0.0, math.inf, pose, _IDENTITY
         normal, gradient, residual, offset = _IDENTITY, np.zeros(6), target, np.zeros(3)
         for _ in range(_MAX_ITERATIONS):
             image, jacobian = cv2.projectPoints(points, trial[:3], trial[3:], self._matrix, self._distortion)
@@ -230,18 +233,20 @@ class PnpSolver:
             else:
                 damping = max(10.0 * damping, 1e-3)
             damped = normal + np.diag(damping * normal.diagonal()) if damping > 1e-9 else normal
-            factor, info = _potrf(damped, lower=1)
+            factor, step, info = _posv(damped, gradient, lower=1)
             if info:
                 damping = max(10.0 * damping, 1e-3)
                 continue
-            step, _ = _potrs(factor, gradient, lower=1)
             trial = pose - step
             # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
             if float(gradient @ step) < decrement and damping <= 1e-9:
                 pose = trial
-                break
-        factor, info = _potrf(normal, lower=1)
-        if info or pose[5] <= 0.0:
+                break  # undamped, so the factor is that of the normal matrix itself
+        else:
+            factor, info = _potrf(normal, lower=1)
+            if info:
+                return None
+        if pose[5] <= 0.0:
             return None
         rotation = _rodrigues(pose[:3])
         cosine = (float(np.vdot(rotation, prior)) - 1.0) / 2.0

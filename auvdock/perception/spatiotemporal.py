@@ -57,6 +57,7 @@ class SpatiotemporalAssociation:
         self._blue_m = np.ascontiguousarray(np.vstack([self._array_m, layout.positions_m[others]]))
         self._authenticator = Authenticator(cfg, self._array_m, self._focal_px)
         self._solver = PnpSolver(pnp, camera)
+        self._sigmas_px = [np.full(count, pixel_sigma_px) for count in range(len(self._array_m) + 1)]
         self.reset()
 
     def reset(self) -> None:
@@ -82,10 +83,10 @@ class SpatiotemporalAssociation:
 
     def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Array) -> Associated | None:
         """Pose from the tracks that carry an identity; clears all identities and returns None if it does not hold."""
-        rows = np.flatnonzero(tracks.beacon_id >= 0)
+        rows = (tracks.beacon_id >= 0).nonzero()[0]
         if len(rows) == 0:
             return None
-        rows = rows[np.argsort(tracks.beacon_id[rows])]
+        rows = rows[tracks.beacon_id[rows].argsort()]
         seen = rows[tracks.detection[rows] >= 0]
         if len(seen) >= 4:
             rows = seen
@@ -110,18 +111,21 @@ class SpatiotemporalAssociation:
         """The pose of the given tracks if it reprojects well, and its mean reprojection error."""
         detection = tracks.detection[rows]
         seen = detection >= 0
-        if seen.all():
-            pixels = detections.centre_px[detection]
-            sigma = np.full(len(rows), self._sigma_px)
+        count = np.count_nonzero(seen)
+        if count == len(rows):
+            pixels = detections.centre_px.take(detection, 0)
+            sigma = self._sigmas_px[count]
         else:
             pixels = tracks.state[rows, :2].copy()
             pixels[seen] = detections.centre_px[detection[seen]]
             sigma = np.where(seen, self._sigma_px, self._sigma_px + np.sqrt(tracks.covariance[rows, 0]))
-        solution = self._solver.solve(self._array_m[tracks.beacon_id[rows]], pixels, sigma, prior, self._last)
+        points = self._array_m.take(tracks.beacon_id[rows], 0)
+        solution = self._solver.solve(points, pixels, sigma, prior, self._last)
         if solution is None:
             return None, 0.0
-        error = float(solution.residual_px[seen].mean()) if seen.any() else float(solution.residual_px.mean())
-        if seen.any() and error > self._pnp.max_reprojection_px:
+        residual = solution.residual_px[seen] if 0 < count < len(rows) else solution.residual_px
+        error = float(np.add.reduce(residual)) / len(residual)
+        if count and error > self._pnp.max_reprojection_px:
             return None, error
         return solution, error
 
@@ -202,9 +206,9 @@ class SpatiotemporalAssociation:
 
     def _reacquire(self, tracks: LightTracker, solution: PnpSolution) -> None:
         """Give lost beacons' identities to new lights at their reprojections."""
-        fresh = np.flatnonzero(
+        fresh = (
             (tracks.beacon_id < 0) & (tracks.class_id == BLUE) & (tracks.detection >= 0) & (tracks.hits >= 2)
-        )
+        ).nonzero()[0]
         if len(fresh) == 0:
             return
         identity = self._match(solution, tracks.state[fresh, :2])

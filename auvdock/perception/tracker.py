@@ -15,10 +15,12 @@ from scipy.optimize import linear_sum_assignment
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
+from auvdock.perception.views import TrackViews
 
 __all__ = ["LightTracker", "TrackerCfg"]
 
 _UNMATCHED_COST = 40.0
+_NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -107,24 +109,30 @@ class LightTracker:
         self._slot = (self._slot + 1) % cfg.window_frames
         n, m = len(self.state), len(detections)
         variance = self._variance / (detections.score + 0.1)
-        free = np.ones(m, dtype=np.bool_)
+        paired: IntArray = _NONE
         if n:
             self._predict()
-            matched = np.full(n, -1, dtype=np.int64)
+            matched = self.detection
+            matched.fill(-1)
             if m:
-                rows, columns = self._assign(detections, variance)
-                matched[rows] = columns
-                free[columns] = False
-                self._correct(matched, detections, variance)
+                rows, paired = self._assign(detections, variance)
+                matched[rows] = paired
             hit = matched >= 0
-            self.detection[:] = matched
             self.missed += 1
-            self.missed[hit] = 0
             self.hits += hit
-            self.history[:, self._slot] = np.where(hit, detections.score[matched], 0.0) if m else 0.0
-            if not hit.all():
+            if len(paired) == n:
+                self._correct(matched, None, detections, variance)
+                self.missed.fill(0)
+                self.history[:, self._slot] = detections.score[matched]
+            else:
+                if m:
+                    self._correct(matched, hit, detections, variance)
+                self.missed[hit] = 0
+                self.history[:, self._slot] = np.where(hit, detections.score[matched], 0.0) if m else 0.0
                 self._bury()
-        if free.any():
+        if len(paired) < m:
+            free = np.ones(m, dtype=np.bool_)
+            free[paired] = False
             self._start(free, detections, variance)
 
     def position_sigma_px(self) -> Array:
@@ -139,43 +147,65 @@ class LightTracker:
         """(n,) mean score of the detections within the window, 0 where there is none."""
         return self.history.sum(axis=1) / np.maximum(self.occurrences(), 1)
 
+    def views(self) -> TrackViews:
+        """The tracks as they are now, for recordings."""
+        return TrackViews(self.state[:, :2], self._labels[:, :4])
+
     def _bind(self) -> None:
-        self.track_id, self.class_id, self.missed, self.hits, self.beacon_id, self.detection = self._labels.T
+        self.track_id, self.class_id, self.beacon_id, self.missed, self.hits, self.detection = self._labels.T
 
     def _predict(self) -> None:
         dt, (q00, q01, q11) = self._dt, self._q
         p00, p01, p11 = self.covariance.T
-        self.state[:, :2] += dt * self.state[:, 2:]
-        p00 += dt * (2.0 * p01 + dt * p11) + q00
-        p01 += dt * p11 + q01
+        place = self.state[:, :2]
+        place += dt * self.state[:, 2:]
+        moved = dt * p11
+        spread = 2.0 * p01
+        spread += moved
+        spread *= dt
+        spread += q00
+        p00 += spread
+        moved += q01
+        p01 += moved
         p11 += q11
 
     def _assign(self, detections: Detections, variance: Array) -> tuple[IntArray, IntArray]:
-        gap = self.state[:, None, :2] - detections.centre_px[None, :, :]
-        spread = self.covariance[:, :1] + variance[None, :]
-        distance = np.einsum("ijk,ijk->ij", gap, gap) / spread
-        allowed = (distance <= self._gate) & (self.class_id[:, None] == detections.class_id[None, :])
-        count = np.count_nonzero(allowed)
+        gap = self.state[:, None, :2] - detections.centre_px
+        spread = self.covariance[:, :1] + variance
+        gap *= gap
+        distance = gap[:, :, 0] + gap[:, :, 1]
+        distance /= spread
+        allowed = self.class_id[:, None] == detections.class_id
+        allowed &= distance <= self._gate
         rows, columns = allowed.nonzero()
-        if len(set(columns.tolist())) == count == len(set(rows.tolist())):
+        if len(set(columns.tolist())) == len(rows) == len(set(rows.tolist())):
             return rows, columns  # nobody competes: the Hungarian method would find the same
         # A stale track has a wide gate: the log term keeps it from taking the detection of a sharp one.
-        cost = np.where(allowed, distance + 2.0 * np.log(spread / variance[None, :]), _UNMATCHED_COST)
+        cost = np.where(allowed, distance + 2.0 * np.log(spread / variance), _UNMATCHED_COST)
         rows, columns = linear_sum_assignment(cost)
         kept = allowed[rows, columns]
         return rows[kept], columns[kept]
 
-    def _correct(self, matched: IntArray, detections: Detections, variance: Array) -> None:
+    def _correct(self, matched: IntArray, hit: BoolArray | None, detections: Detections, variance: Array) -> None:
+        """Kalman correction of the tracks `hit`, all if None."""
         p00, p01, p11 = self.covariance.T
-        hit = matched >= 0
-        inverse = hit / (p00 + variance[matched])
-        gain_0, gain_1 = p00 * inverse, p01 * inverse
-        innovation = detections.centre_px[matched] - self.state[:, :2]
-        self.state[:, :2] += gain_0[:, None] * innovation
-        self.state[:, 2:] += gain_1[:, None] * innovation
+        spread = variance[matched]
+        spread += p00
+        gain = np.empty((2, len(spread), 1))
+        gain_0, gain_1 = gain[:, :, 0]
+        inverse = np.divide(1.0 if hit is None else hit, spread, out=spread)
+        np.multiply(p00, inverse, out=gain_0)
+        np.multiply(p01, inverse, out=gain_1)
+        place, speed = self.state[:, :2], self.state[:, 2:]
+        innovation = detections.centre_px.take(matched, 0)
+        innovation -= place
+        correction = gain * innovation
+        place += correction[0]
+        speed += correction[1]
         p11 -= gain_1 * p01
-        p01 *= 1.0 - gain_0
-        p00 *= 1.0 - gain_0
+        rest = 1.0 - gain_0
+        p01 *= rest
+        p00 *= rest
 
     def _bury(self) -> None:
         cfg = self._cfg
@@ -186,8 +216,8 @@ class LightTracker:
             self._keep(alive)
 
     def _keep(self, alive: BoolArray) -> None:
-        self.state, self.covariance = self.state[alive], self.covariance[alive]
-        self.history, self._labels = self.history[alive], self._labels[alive]
+        self.state, self.covariance = self.state.compress(alive, 0), self.covariance.compress(alive, 0)
+        self.history, self._labels = self.history.compress(alive, 0), self._labels.compress(alive, 0)
         self._bind()
 
     def _start(self, free: BoolArray, detections: Detections, variance: Array) -> None:
@@ -203,8 +233,8 @@ class LightTracker:
         labels = np.zeros((count, 6), dtype=np.int64)
         labels[:, 0] = np.arange(self._next_id, self._next_id + count)
         labels[:, 1] = detections.class_id[index]
-        labels[:, 3] = 1
-        labels[:, 4] = -1
+        labels[:, 2] = -1
+        labels[:, 4] = 1
         labels[:, 5] = index
         self._next_id += count
         self.state = np.concatenate([self.state, state])

@@ -18,7 +18,7 @@ __all__ = ["GRAVITY_M_S2", "Hydrodynamics"]
 GRAVITY_M_S2 = 9.81
 """Standard of the vehicle data: weight = mass × 9.81."""
 
-_TRIL = np.tril_indices(6)
+_TRIL = np.ravel_multi_index(np.tril_indices(6), (6, 6))
 
 
 class Hydrodynamics:
@@ -60,15 +60,19 @@ class Hydrodynamics:
         self._buoyancy_n = vehicle.buoyancy_n
         self._added = added
         self._frame = np.eye(6)
+        self._half, self._whole, self._rows = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(21)
 
     def added_mass_rows(self, rotation: Array) -> Array:
         """(21,) lower triangle, row by row, of T M_A Tᵀ with T = diag(R, 1): M_A in a free joint's coordinates.
 
-        A free joint's velocity is (linear in the world frame, angular in the body frame).
+        A free joint's velocity is (linear in the world frame, angular in the body frame). The array is overwritten by
+        the next call.
         """
         frame = self._frame
         frame[:3, :3] = rotation
-        return (frame @ self._added @ frame.T)[_TRIL]
+        frame.dot(self._added, self._half)
+        self._half.dot(frame.T, self._whole)
+        return self._whole.take(_TRIL, out=self._rows, mode="clip")  # mode: "raise" would copy through a buffer
 
     def wrench(
         self,
@@ -100,15 +104,16 @@ class Hydrodynamics:
         w = r02 * vx + r12 * vy + r22 * vz
         s = abs(u)
         uu = u * s
-        z = [u, v, w, p, q, r, uu, v * abs(v), w * abs(w), p * abs(p), q * abs(q), r * abs(r)]
-        z += [uu, s * v, s * w, s * p, s * q, s * r]
-        z += [
+        z = [u, v, w, p, q, r, uu, v * abs(v), w * abs(w), p * abs(p), q * abs(q), r * abs(r), uu, s * v, s * w, s * p]
+        z += (
+            s * q,
+            s * r,
             q * w - r * v + r00 * gx + r10 * gy,
             r * u - p * w + r01 * gx + r11 * gy,
             p * v - q * u + r02 * gx + r12 * gy,
-        ]
+        )
         z += [uu * x if fin else x for x, fin in zip(actuators, self._is_fin, strict=True)]
-        out: list[float] = (self._weights @ np.array(z)).tolist()
+        out: list[float] = self._weights.dot(np.array(z)).tolist()
         fx, fy, fz, k, m, n, px, py, pz, hx, hy, hz = out[:12]
         # −C_A(ν_r) ν_r = (p × ω, p × v + h × ω) with the added momenta p, h (Fossen 2011, equation 6.43).
         fx += py * r - pz * q

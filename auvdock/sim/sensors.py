@@ -88,16 +88,26 @@ class Sensors:
         latched: bool,
     ) -> Proprioception:
         """One sample of all sensors."""
-        error = self._bias + self._std * self._rng.standard_normal(13)
-        euler = np.array(euler_zyx_rad) + error[1:4]
-        euler[2] = math.remainder(float(euler[2]), 2.0 * math.pi)
+        # In plain floats: for a dozen numbers that takes a third of the time of array operations.
+        error: list[float] = (self._bias + self._std * self._rng.standard_normal(13)).tolist()
+        roll, pitch, yaw = euler_zyx_rad
+        nu: list[float] = nu_body.tolist()
+        relative: list[float] = nu_relative_body.tolist()
+        scale = self._scale
+        readings = [
+            (roll + error[1], pitch + error[2], math.remainder(yaw + error[3], 2.0 * math.pi)),
+            (nu[3] + error[4], nu[4] + error[5], nu[5] + error[6]),
+            (scale * nu[0] + error[7], scale * nu[1] + error[8], scale * nu[2] + error[9]),
+            (scale * relative[0] + error[10], scale * relative[1] + error[11], scale * relative[2] + error[12]),
+        ]
+        euler, gyro, ground, water = np.array(readings)
         return Proprioception(
             time_s=time_s,
-            depth_m=depth_m + float(error[0]),
+            depth_m=depth_m + error[0],
             euler_zyx_rad=euler,
-            angular_velocity_rad_s=nu_body[3:] + error[4:7],
-            velocity_ground_m_s=self._scale * nu_body[:3] + error[7:10],
-            velocity_water_m_s=self._scale * nu_relative_body[:3] + error[10:13],
+            angular_velocity_rad_s=gyro,
+            velocity_ground_m_s=ground,
+            velocity_water_m_s=water,
             contact=switch_force_n > self._cfg.contact_threshold_n,
             latched=latched,
         )

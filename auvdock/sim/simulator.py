@@ -106,6 +106,7 @@ class Simulator:
         self._weld = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_EQUALITY, LATCH)
         self._body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
         self._truth: Truth | None = None
+        self._motion_now: tuple[Array, Array, Array, Array] | None = None
         self._bind()
         self.reset(np.array(self._dock.free_world_m), np.array([0.0, 0.0, 0.0, 1.0]), np.random.default_rng(0))
 
@@ -131,6 +132,7 @@ class Simulator:
     @property
     def data(self) -> MjData:
         """MuJoCo's data, with poses of bodies, geoms, cameras and lights brought up to the present state."""
+        self._motion_now = None  # whoever holds the data may change it
         if self._poses_stale:
             mujoco.mj_kinematics(self.model, self._data)
             mujoco.mj_comPos(self.model, self._data)
@@ -198,10 +200,11 @@ class Simulator:
         if self._diverged:
             return
         model, data = self.model, self._data
-        state = self._actuators.step(command)
+        values: list[float] = command.tolist() if isinstance(command, np.ndarray) else list(command)
+        state = self._actuators.step(values)
         qpos: list[float] = self._qpos.tolist()
         qvel: list[float] = self._qvel.tolist()
-        self.history.append(HistoryEntry(self.time_s, qpos, qvel, list(command)))
+        self.history.append(HistoryEntry(self.time_s, qpos, qvel, values))
         if is_absurd(qpos, qvel):
             self._freeze()
             return
@@ -239,9 +242,9 @@ class Simulator:
         rotation, nu, nu_relative, water = self._motion()
         dock = self._dock.report()
         entry = dock.entry
-        pose, nose = make_transform(rotation, self._qpos[:3]), np.array(dock.nose_station_m)
-        for array in (pose, nose, nu, nu_relative, water):
-            array.flags.writeable = False
+        pose, nose = np.zeros((4, 4)), np.array(dock.nose_station_m)
+        pose[:3, :3], pose[:3, 3], pose[3, 3] = rotation, self._qpos[:3], 1.0
+        pose.flags.writeable = nose.flags.writeable = False
         self._truth = Truth(
             time_s=self.time_s,
             T_world_body=pose,
@@ -280,17 +283,26 @@ class Simulator:
         )
 
     def _motion(self) -> tuple[Array, Array, Array, Array]:
-        """Rotation body to world, ν over ground, ν relative to the water, water's velocity."""
-        w, x, y, z = self._qpos[3:7].tolist()
-        rotation = np.array(rotation_rows(w, x, y, z)).reshape(3, 3)
-        water = np.array(self._ocean.velocity(float(self._qpos[2])))
-        nu = np.concatenate([self._qvel[:3] @ rotation, self._qvel[3:6]])
-        nu_relative = np.concatenate([(self._qvel[:3] - water) @ rotation, self._qvel[3:6]])
-        return rotation, nu, nu_relative, water
+        """Rotation body to world, ν over ground, ν relative to the water, water's velocity; read-only, kept for a step."""
+        if self._motion_now is not None:
+            return self._motion_now
+        qpos: list[float] = self._qpos.tolist()
+        rotation = np.array(rotation_rows(*qpos[3:7])).reshape(3, 3)
+        water = np.array(self._ocean.velocity(qpos[2]))
+        velocity, spin = self._qvel[:3], self._qvel[3:6]
+        nu, nu_relative = np.empty(6), np.empty(6)
+        nu[:3] = velocity @ rotation
+        nu_relative[:3] = (velocity - water) @ rotation
+        nu[3:] = nu_relative[3:] = spin
+        motion = rotation, nu, nu_relative, water
+        for array in motion:
+            array.flags.writeable = False
+        self._motion_now = motion
+        return motion
 
     def _observe(self) -> None:
         """Dock, latch and divergence after a step or a reset."""
-        self._truth = None
+        self._truth = self._motion_now = None
         qpos: list[float] = self._qpos.tolist()
         qvel: list[float] = self._qvel.tolist()
         if is_absurd(qpos, qvel):
@@ -305,7 +317,7 @@ class Simulator:
     def _freeze(self) -> None:
         """Mark as diverged and go back to the last sane state, so that nobody downstream meets a NaN."""
         self._diverged = True
-        self._truth = None
+        self._truth = self._motion_now = None
         self._qpos[:], self._qvel[:] = self._sane
         self._contacts.force_n = 0.0
 

@@ -17,7 +17,6 @@ from auvdock.core.contracts import (
     Proprioception,
     RegionOfInterest,
     TagDetection,
-    TrackView,
 )
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.perception.landing.bearing import group_bearing
@@ -27,8 +26,8 @@ from auvdock.perception.landing.fusion import agree, weighted_mean
 from auvdock.perception.landing.level import LevelPose, LevelSolver, pose_offset
 from auvdock.perception.landing.lights import LightLevel, NamedLights
 from auvdock.perception.landing.tag import TagLevel
-from auvdock.perception.pipeline import track_views
 from auvdock.perception.tracker import LightTracker
+from auvdock.perception.views import TrackViews
 
 __all__ = ["LandingPercept", "LandingPerception"]
 
@@ -260,11 +259,11 @@ class LandingPerception:
             measured=bool(used),
         )
 
-    def _views(self, named: NamedLights | None) -> tuple[TrackView, ...]:
+    def _views(self, named: NamedLights | None) -> TrackViews:
         tracks = self._tracks
         tracks.beacon_id[:] = -1
         if named is not None:
             for light, detection in enumerate(named.detection.tolist()):
                 if detection >= 0:
                     tracks.beacon_id[tracks.detection == detection] = light
-        return track_views(tracks)
+        return tracks.views()
