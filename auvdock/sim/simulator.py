@@ -283,7 +283,7 @@ class Simulator:
         )
 
     def _motion(self) -> tuple[Array, Array, Array, Array]:
-        """Rotation body to world, ν over ground, ν relative to the water, water's velocity; read-only, kept for a step."""
+        """Rotation body to world, ν over ground, ν relative to the water, water's velocity; kept for a step."""
         if self._motion_now is not None:
             return self._motion_now
         qpos: list[float] = self._qpos.tolist()

@@ -93,7 +93,7 @@ def test_nothing_seen(association: str):
         assert percept.long_range is None
         assert percept.entrance is None
         assert percept.array_count == 0
-        assert percept.tracks == ()
+        assert len(percept.tracks) == 0
 
 
 @pytest.mark.parametrize("association", ASSOCIATIONS)
