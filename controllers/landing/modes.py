@@ -76,7 +76,7 @@ class LandingModeCfg:
     """A pose is fresh this long."""
     sight_lost_s: float = 3.0
     """Approach ends when neither pose nor lights were seen for this long."""
-    search_timeout_s: float = 90.0
+    search_timeout_s: float = 150.0
     """Longest search."""
     approach_timeout_s: float = 60.0
     """Longest approach."""

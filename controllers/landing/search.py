@@ -1,4 +1,7 @@
-"""Looking for the station from above: hold, climb, and spiral around the place where it was last thought to be."""
+"""Looking for the station from above: hold, climb, and spiral around the place where it was last thought to be.
+
+Two spirals grow by turns, one high, one low: in turbid water the marks are seen only from near by.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from dataclasses import dataclass
 
 from auvdock.core.errors import ConfigError
 
-__all__ = ["SpiralCfg", "spiral"]
+__all__ = ["SpiralCfg", "spiral", "spiral_pass"]
 
 
 @dataclass(frozen=True)
@@ -18,8 +21,12 @@ class SpiralCfg:
     """Wait on the spot before the first turn: perception needs some frames."""
     height_m: float = 4.5
     """The seat is taken at least so high above its place on the station: the view widens with height."""
+    high_s: float = 60.0
+    """Time on the high spiral, at that height, before the low one has its turn."""
+    low_s: float = 30.0
+    """Time on the low one, at the least height that is allowed without a pose."""
     climb_m_s: float = 0.2
-    """Speed of that climb."""
+    """Vertical speed between them."""
     pitch_m: float = 1.2
     """Distance between two turns of the spiral."""
     speed_m_s: float = 0.25
@@ -34,6 +41,14 @@ class SpiralCfg:
                 raise ConfigError(f"control.search.{name}", value, "a value above 0")
 
 
+def spiral_pass(time_s: float, cfg: SpiralCfg) -> tuple[bool, float]:
+    """Whether the high spiral has its turn at a time since the search began, and for how long that spiral was flown."""
+    turns, rest_s = divmod(max(0.0, time_s), cfg.high_s + cfg.low_s)
+    if rest_s < cfg.high_s:
+        return True, turns * cfg.high_s + rest_s
+    return False, turns * cfg.low_s + rest_s - cfg.high_s
+
+
 def spiral(time_s: float, cfg: SpiralCfg) -> tuple[float, float]:
     """Where to be on the spiral, relative to its centre, m.
 
@@ -41,7 +56,7 @@ def spiral(time_s: float, cfg: SpiralCfg) -> tuple[float, float]:
     greatest radius R it goes on as a circle with θ̇ = v/R.
 
     Args:
-        time_s: time since the search began.
+        time_s: time for which this spiral was flown.
         cfg: the pattern.
     """
     flown_s = max(0.0, time_s - cfg.settle_s)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from auvdock.controllers.landing.guidance import Flat, LandingGuidanceCfg, Place, sink_m_s
 from auvdock.controllers.landing.modes import ABORT, ALIGN, APPROACH, DESCEND, TOUCHDOWN, LandingModeCfg
-from auvdock.controllers.landing.search import SpiralCfg, spiral
+from auvdock.controllers.landing.search import SpiralCfg, spiral, spiral_pass
 
 __all__ = ["Demand", "Situation", "demand"]
 
@@ -88,22 +88,25 @@ def demand(now: Situation, guidance: LandingGuidanceCfg, modes: LandingModeCfg, 
         sink = guidance.touchdown_sink_m_s if committed else 0.0
         return Demand(target, guidance.touchdown_speed_m_s, -sink, heading, integrate=False)
     if now.mode in (APPROACH, ALIGN):
-        # Lights or memory without a pose: go there, and not down.
-        height = max(now.anchor_height_m, modes.min_blind_height_m)
-        return Demand(
-            target or back, guidance.approach_speed_m_s, max(0.0, _hold(now, height, guidance)), heading, False
-        )
+        # Lights or memory without a pose: go there first, then down, but not far.
+        above = target is not None and math.hypot(*target) < 0.25 * now.height_m
+        least = modes.min_blind_height_m
+        height = least if above else max(now.height_m, least)
+        heave = max(-guidance.align_speed_m_s, _hold(now, height, guidance))
+        return Demand(target or back, guidance.approach_speed_m_s, heave, heading, integrate=False)
     return _search(now, heading, guidance, modes, pattern)
 
 
 def _search(
     now: Situation, heading_rad: float, guidance: LandingGuidanceCfg, modes: LandingModeCfg, pattern: SpiralCfg
 ) -> Demand:
-    """Climb, then circle outwards around the station's last known place, or around where the search began."""
-    height = max(now.anchor_height_m, pattern.height_m, modes.min_blind_height_m)
-    x, y = spiral(now.in_mode_s, pattern)
+    """Circle outwards, high and low by turns, around the station's last known place or where the search began."""
+    high, flown_s = spiral_pass(now.in_mode_s, pattern)
+    least = modes.min_blind_height_m
+    height = max(now.anchor_height_m, pattern.height_m, least) if high else least
+    x, y = spiral(flown_s, pattern)
     around = now.to_station_m or (-now.from_anchor_m[0], -now.from_anchor_m[1])
-    heave = min(pattern.climb_m_s, max(0.0, _hold(now, height, guidance)))
+    heave = min(pattern.climb_m_s, max(-pattern.climb_m_s, _hold(now, height, guidance)))
     return Demand((around[0] + x, around[1] + y), guidance.approach_speed_m_s, heave, heading_rad, False)
 
 

@@ -17,7 +17,7 @@ from auvdock.controllers.landing.config import HoverAllocationCfg, LandingContro
 from auvdock.controllers.landing.guidance import LandingGuidanceCfg, Place, corridor_m, sink_m_s, station_keeping
 from auvdock.controllers.landing.modes import LANDING_MODES, LANDING_TRANSITIONS, LandingModeCfg
 from auvdock.controllers.landing.pilot import LandingPilot
-from auvdock.controllers.landing.search import SpiralCfg, spiral
+from auvdock.controllers.landing.search import SpiralCfg, spiral, spiral_pass
 from auvdock.core.contracts import Bearing, PoseEstimate, Proprioception
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import from_mapping, to_plain
@@ -112,8 +112,8 @@ def test_station_lost_for_good_ends_the_descent_and_the_attempt(status):
 
 
 @pytest.mark.parametrize("name", PILOTS)
-def test_without_a_pose_it_never_goes_down(name):
-    """Lights in sight but never a pose: it comes above them, does not descend, and gives up in the end."""
+def test_without_a_pose_it_never_goes_low(name):
+    """Lights in sight but never a pose: it comes above them, goes down to 2 m but no lower, and gives up in the end."""
     lander = Lander(name, 3.0, 1.0, -1.0, sensors=SensorCfg(), seed=2)
     heights, modes = [], []
 
@@ -123,7 +123,7 @@ def test_without_a_pose_it_never_goes_down(name):
     for offset, _, command in fly(lander, 400.0, spoil, pilot=HASTY[name]):
         heights.append(offset[2])
         modes.append(command)
-    assert min(heights) > 2.9
+    assert MODES.min_blind_height_m - 0.05 < min(heights) < MODES.min_blind_height_m + 0.2
     assert modes[-1].giving_up
     assert set(modes_of(modes)) <= {"search", "approach", "abort"}
 
@@ -262,6 +262,15 @@ def test_spiral_has_its_pitch_speed_and_end():
     ahead = np.array([x for x, y in points if abs(y) < 0.02 and 0.1 < x < 4.9])
     crossings = ahead[np.r_[True, np.diff(ahead) > 0.5]]
     np.testing.assert_allclose(np.diff(crossings), cfg.pitch_m, atol=0.1)
+
+
+def test_high_and_low_spirals_take_turns_and_each_goes_on_where_it_stopped():
+    cfg = SpiralCfg()
+    cycle = cfg.high_s + cfg.low_s
+    assert spiral_pass(0.0, cfg) == (True, 0.0)
+    assert spiral_pass(cfg.high_s + 5.0, cfg) == (False, 5.0)
+    assert spiral_pass(cycle + 5.0, cfg) == (True, cfg.high_s + 5.0)
+    assert spiral_pass(cycle + cfg.high_s + 5.0, cfg) == (False, cfg.low_s + 5.0)
 
 
 def test_configuration_survives_plain_data_and_refuses_nonsense():
