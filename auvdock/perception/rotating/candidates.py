@@ -1,0 +1,231 @@
+"""Lights followed in compass bearing, with the history of their brightness."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.camera import Camera
+from auvdock.core.contracts import Detections
+from auvdock.perception.rotating.config import ForwardBeaconCfg
+from auvdock.perception.rotating.motion import CameraPlace
+
+__all__ = ["Candidate", "Candidates", "Pass", "Spot", "merge_spots"]
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """One light of one frame: detections that lie close together.
+
+    Attributes:
+        ray_camera: (3,) unit ray.
+        flux: the brightest detection's flux.
+        score: its score.
+        rows: its rows in the frame's detections.
+    """
+
+    ray_camera: Array
+    flux: float
+    score: float
+    rows: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """The beam swept past once.
+
+    Attributes:
+        time_s: time of the peak.
+        sigma_rad: its standard deviation as beam angle.
+        amplitude: flux at the peak, above steady light.
+        widening: of the pass profile.
+        ray_compass: (3,) unit direction to the light in level compass axes.
+        place_m: (2,) place of the camera at the peak.
+        covered: the light was in view for most of the turn before.
+        score: mean detection score.
+    """
+
+    time_s: float
+    sigma_rad: float
+    amplitude: float
+    widening: float
+    ray_compass: Array
+    place_m: Array
+    covered: bool
+    score: float
+
+
+@dataclass(eq=False)
+class Candidate:
+    """One light over time; times, fluxes and rays of the frames in which its direction was in view.
+
+    Attributes:
+        ray_compass: (3,) direction as last seen, or predicted.
+        last_seen_s: time of the last detection.
+        times_s, flux, seen: samples; flux is 0 where the light was not found.
+        rays: compass rays of the samples, None where the light was not found.
+        scores: detection scores, 0 likewise.
+        judged_s: samples up to here have been judged.
+        chain: coherent passes so far.
+        hits: detections so far.
+    """
+
+    ray_compass: Array
+    last_seen_s: float
+    times_s: list[float] = field(default_factory=list[float])
+    flux: list[float] = field(default_factory=list[float])
+    seen: list[bool] = field(default_factory=list[bool])
+    rays: list[Array | None] = field(default_factory=list["Array | None"])
+    scores: list[float] = field(default_factory=list[float])
+    judged_s: float = -math.inf
+    chain: list[Pass] = field(default_factory=list[Pass])
+    hits: int = 0
+
+    def add(self, time_s: float, spot: Spot, ray_compass: Array, keep_s: float) -> None:
+        """One frame in which the light was seen."""
+        self.times_s.append(time_s)
+        self.flux.append(spot.flux)
+        self.seen.append(True)
+        self.rays.append(ray_compass)
+        self.scores.append(spot.score)
+        self.last_seen_s, self.ray_compass, self.hits = time_s, ray_compass, self.hits + 1
+        self._forget(time_s - keep_s)
+
+    def share(self, time_s: float, spot: Spot | None, keep_s: float) -> None:
+        """One frame with the light in view and no spot of its own: not found, or part of another light's `spot`."""
+        self.times_s.append(time_s)
+        self.flux.append(spot.flux if spot is not None else 0.0)
+        self.seen.append(spot is not None)
+        self.rays.append(self.ray_compass if spot is not None else None)
+        self.scores.append(spot.score if spot is not None else 0.0)
+        self._forget(time_s - keep_s)
+
+    def _forget(self, before_s: float) -> None:
+        if self.times_s[0] < before_s:
+            cut = next(k for k, t in enumerate(self.times_s) if t >= before_s)
+            del self.times_s[:cut], self.flux[:cut], self.seen[:cut], self.rays[:cut], self.scores[:cut]
+
+
+def merge_spots(detections: Detections, camera: Camera, merge_rad: float) -> list[Spot]:
+    """Lights of a frame, brightest first.
+
+    Detections within `merge_rad` of a brighter one are the same light; its direction is their mean, weighted by flux.
+    Without flux, brightness comes from the score: (s / (1 - s))² goes with light in a code that is the root of it, for
+    one exposure only.
+    """
+    if len(detections) == 0:
+        return []
+    rays = camera.rays(detections.centre_px)
+    flux = detections.flux
+    if flux is None:
+        score = np.clip(detections.score, 0.0, 0.999)
+        flux = (score / (1.0 - score)) ** 2
+    cosine = math.cos(merge_rad)
+    free = np.ones(len(rays), dtype=np.bool_)
+    spots: list[Spot] = []
+    for first in np.argsort(-flux, kind="stable"):
+        if not free[first]:
+            continue
+        rows = np.flatnonzero(free & (rays @ rays[first] >= cosine))
+        free[rows] = False
+        ray = (flux[rows] + 1e-12) @ rays[rows]
+        norm = float(np.linalg.norm(ray))
+        ray = ray / norm if norm > 0.0 else rays[first]
+        spots.append(Spot(ray, float(flux[first]), float(detections.score[first]), tuple(rows.tolist())))
+    return spots
+
+
+class Candidates:
+    """The lights that are followed."""
+
+    def __init__(self, cfg: ForwardBeaconCfg, camera: Camera, turn_s: float) -> None:
+        """Keep the settings.
+
+        Args:
+            cfg: gates and limits.
+            camera: the camera.
+            turn_s: duration of a turn of the beacon.
+        """
+        self._cfg, self._camera, self._turn_s = cfg, camera, turn_s
+        self._merge_cosine = math.cos(math.radians(cfg.merge_deg))
+        self.all: list[Candidate] = []
+
+    def reset(self) -> None:
+        """Forget all."""
+        self.all = []
+
+    def update(self, spots: list[Spot], place: CameraPlace, kept: Candidate | None) -> dict[int, Candidate]:
+        """Give each spot to its candidate or make a new one; returns candidates by their spot's index.
+
+        Args:
+            spots: lights of this frame.
+            place: the camera's place and attitude.
+            kept: a candidate that is never dropped.
+        """
+        cfg = self._cfg
+        self._drop(place.time_s, kept)
+        rays = [place.R_compass_camera @ spot.ray_camera for spot in spots]
+        owner = self._assign(rays, place.time_s)
+        in_view = self._in_view(place)
+        keep_s = 2.5 * self._turn_s
+        by_candidate = {id(candidate): index for index, candidate in owner.items()}
+        for candidate, visible in zip(self.all, in_view.tolist(), strict=True):
+            index = by_candidate.get(id(candidate))
+            if index is not None:
+                candidate.add(place.time_s, spots[index], rays[index], keep_s)
+            elif visible:
+                # Two lights that melt into one from time to time share its brightness then.
+                shared = self._nearest(candidate, rays)
+                candidate.share(place.time_s, None if shared is None else spots[shared], keep_s)
+        for index, spot in enumerate(spots):
+            if index in owner or len(self.all) - len(owner) > 2 * cfg.max_candidates:
+                continue
+            candidate = Candidate(rays[index], place.time_s)
+            candidate.add(place.time_s, spot, rays[index], keep_s)
+            self.all.append(candidate)
+            owner[index] = candidate
+        return owner
+
+    def _assign(self, rays: list[Array], time_s: float) -> dict[int, Candidate]:
+        """Nearest pairs first, each candidate and each spot once."""
+        if not rays or not self.all:
+            return {}
+        directions = np.array([candidate.ray_compass for candidate in self.all])
+        cosine = np.clip(np.array(rays) @ directions.T, -1.0, 1.0)
+        gap = np.degrees(np.arccos(cosine))
+        since = time_s - np.array([candidate.last_seen_s for candidate in self.all])
+        gate = np.minimum(self._cfg.gate_deg + self._cfg.gate_rise_deg_s * since, self._cfg.max_gate_deg)
+        gap = np.where(gap <= gate, gap, np.inf)
+        owner: dict[int, Candidate] = {}
+        while np.isfinite(gap.min()):
+            spot, row = np.unravel_index(int(gap.argmin()), gap.shape)
+            owner[int(spot)] = self.all[int(row)]
+            gap[spot, :] = np.inf
+            gap[:, row] = np.inf
+        return owner
+
+    def _nearest(self, candidate: Candidate, rays: list[Array]) -> int | None:
+        """The spot within the merging distance of a candidate that has none of its own."""
+        best, index = self._merge_cosine, None
+        for k, ray in enumerate(rays):
+            if (cosine := float(ray @ candidate.ray_compass)) >= best:
+                best, index = cosine, k
+        return index
+
+    def _in_view(self, place: CameraPlace) -> BoolArray:
+        if not self.all:
+            return np.zeros(0, dtype=np.bool_)
+        directions = np.array([candidate.ray_compass for candidate in self.all])
+        return self._camera.in_view(directions @ place.R_compass_camera)
+
+    def _drop(self, time_s: float, kept: Candidate | None) -> None:
+        """Lights not seen for two and a half turns go, and the rarest of too many."""
+        oldest = time_s - 2.5 * self._turn_s
+        self.all = [c for c in self.all if c.last_seen_s >= oldest or c is kept]
+        if len(self.all) > self._cfg.max_candidates:
+            ranked = sorted(self.all, key=lambda c: (c is kept, len(c.chain), c.hits, c.last_seen_s), reverse=True)
+            chosen = {id(c) for c in ranked[: self._cfg.max_candidates]}
+            self.all = [c for c in self.all if id(c) in chosen]
