@@ -23,8 +23,8 @@ def test_beacon_is_where_the_optics_put_it(rig):
         view = rig.imager.lit.look(rig.pose(x_m, y_m), 0.0)
         assert view.pixels[rig.imager.lit.rotating.lamp] == pytest.approx(rig.beacon_px(x_m, y_m), abs=1e-6)
         # Seen from x > 0 the beacon lies to the left, as far as the camera's azimuth says.
-        left = (rig.camera.matrix[0, 2] - rig.beacon_px(x_m, y_m)[0]) / rig.camera.matrix[0, 0]
-        assert math.atan(left) == pytest.approx(rig.azimuth_rad(x_m, y_m), abs=1e-9)
+        right = rig.camera.normalise(rig.beacon_px(x_m, y_m)[None, :])[0, 0]
+        assert math.atan(-right) == pytest.approx(rig.azimuth_rad(x_m, y_m), abs=1e-6)
 
 
 def test_brightest_when_the_beam_points_at_the_camera(rig):
