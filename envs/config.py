@@ -5,33 +5,45 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from auvdock.core.beacons import BeaconCfg
 from auvdock.core.camera import CameraCfg
 from auvdock.core.errors import ConfigError
+from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.station import ConicalStationCfg, load_conical_station
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.sim.simulator import SimCfg
 
-__all__ = ["FIDELITIES", "LimitsCfg", "StartCfg", "WorldCfg"]
+__all__ = ["FIDELITIES", "HEADINGS", "LimitsCfg", "StartCfg", "WorldCfg", "rotating_world_cfg"]
 
 FIDELITIES = ("pixels", "beacons")
 """`pixels` renders every frame; `beacons` draws detections from the same radiometry without an image."""
+HEADINGS = ("surveyed", "unknown")
+"""Whether the compass heading of the station's axis is known before the episode."""
 
 
 @dataclass(frozen=True)
 class StartCfg:
-    """Where an episode starts; each quantity is drawn uniformly."""
+    """Where an episode starts; each quantity is drawn uniformly.
 
+    Either in a box before the mouth, or in a ring about it (`ring`): at a radius of `min_range_m` to `max_range_m`, at
+    an azimuth within ±`azimuth_deg` of the approach axis, headed within ±`heading_deg` of the direction to the station.
+    """
+
+    ring: bool = False
+    """Start in a ring about the station instead of a box before its mouth."""
     min_range_m: float = 15.0
-    """Least distance in front of the mouth."""
+    """Least distance in front of the mouth; of a ring its inner radius."""
     max_range_m: float = 30.0
-    """Greatest distance in front of the mouth."""
+    """Greatest distance in front of the mouth; of a ring its outer radius."""
+    azimuth_deg: float = 180.0
+    """Of a ring: greatest azimuth to either side of the approach axis; 180 is all around."""
     lateral_m: float = 3.0
-    """Greatest distance sideways from the approach axis."""
+    """Greatest distance sideways from the approach axis; unused in a ring."""
     vertical_m: float = 1.5
     """Greatest depth difference to the mouth's centre."""
     heading_deg: float = 30.0
-    """Greatest heading difference to the approach axis."""
+    """Greatest heading difference to the approach axis; in a ring, to the direction of the station."""
     random_current_direction: bool = False
     """Draw the current's direction uniformly instead of taking sim.current.direction_deg."""
 
@@ -39,6 +51,8 @@ class StartCfg:
         """Refuse impossible starts."""
         if not 2.0 <= self.min_range_m <= self.max_range_m:
             raise ConfigError("world.start.min_range_m", self.min_range_m, "2 m or more and at most max_range_m")
+        if not 0.0 <= self.azimuth_deg <= 180.0:
+            raise ConfigError("world.start.azimuth_deg", self.azimuth_deg, "0 to 180 degrees")
         for name in ("lateral_m", "vertical_m", "heading_deg"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ConfigError(f"world.start.{name}", getattr(self, name), "0 or more")
@@ -81,12 +95,40 @@ class WorldCfg:
     limits: LimitsCfg = LimitsCfg()
     control_hz: float = 30.0
     """Commands a second."""
+    station_heading: str = "surveyed"
+    """"surveyed", or "unknown": each episode then draws a datum in ±180° that is added to every compass reading, so that
+    the station's heading by that compass must be perceived."""
+    clock: BeaconClockCfg = BeaconClockCfg()
+    """Error of the vehicle's clock against the station's; it matters with a rotating beacon only."""
+    frame_drop_share: float = 0.0
+    """Share of the camera's frames that are lost at random."""
+    extra_lights: tuple[BeaconCfg, ...] = ()
+    """Lamps, placed in the station frame, of which the vehicle has not been told."""
 
     def __post_init__(self) -> None:
         """Check that the rates divide and the names exist."""
+        if self.station_heading not in HEADINGS:
+            raise ConfigError("world.station_heading", self.station_heading, f"one of {', '.join(HEADINGS)}")
+        if not 0.0 <= self.frame_drop_share <= 0.95:
+            raise ConfigError("world.frame_drop_share", self.frame_drop_share, "a share of 0 to 0.95")
         if self.fidelity not in FIDELITIES:
             raise ConfigError("fidelity", self.fidelity, f"one of {', '.join(FIDELITIES)}")
         for name, rate in (("world.control_hz", self.control_hz), ("world.camera.rate_hz", self.camera.rate_hz)):
             steps = self.sim.physics_hz / rate if rate > 0.0 else 0.0
             if steps < 1.0 or abs(steps - round(steps)) > 1e-9:
                 raise ConfigError(name, rate, f"a rate that divides the physics rate of {self.sim.physics_hz:g} Hz")
+
+
+def rotating_world_cfg() -> WorldCfg:
+    """The world of docking by a rotating beacon: paper B's pool, a ring of starts, the station's heading unknown.
+
+    Half a circle at 12 m and the way there from 45 m take some 110 m, 200 s at the pilot's speeds in a current of
+    0.3 m/s; `max_time_s` leaves room for a second search and a second approach.
+    """
+    return WorldCfg(
+        water="pool",
+        station=load_conical_station("rotating"),
+        start=StartCfg(ring=True, min_range_m=20.0, max_range_m=45.0, heading_deg=180.0),
+        limits=LimitsCfg(max_time_s=600.0),
+        station_heading="unknown",
+    )

@@ -78,7 +78,7 @@ import numpy as np
 from gymnasium import spaces
 
 from auvdock.core.arrays import Array, Image
-from auvdock.core.contracts import Percept, Proprioception
+from auvdock.core.contracts import AzimuthFix, Percept, Proprioception
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
 from auvdock.envs.chase import ChaseCamera
@@ -135,6 +135,7 @@ class DockingEnv(gymnasium.Env[Any, Any]):
         self._perception = BeaconPerception(self._perception_cfg, self._world.camera, self.cfg.station.layout)
         self._chase = ChaseCamera(self._world.simulator)
         self._percept: Percept | None = None
+        self._fix: AzimuthFix | None = None
         self._sensed: Sensed | None = None
         self._image: Image | None = None
         self._distance_m = 0.0
@@ -167,6 +168,7 @@ class DockingEnv(gymnasium.Env[Any, Any]):
         self._world.reset(int(self.np_random.integers(2**31)))
         self._perception.reset()
         self._percept = None
+        self._fix = None
         self._image = None
         self._sense()
         truth = self._world.truth
@@ -214,6 +216,7 @@ class DockingEnv(gymnasium.Env[Any, Any]):
             detections = self._detector.detect(sensed.frame) if sensed.frame is not None else sensed.detections
             if detections is not None:
                 self._percept = self._perception.update(detections, sensed.proprioception)
+                self._fix = self._percept.azimuth or self._fix
 
     def _reward(self, truth: Truth, success: bool, end: str | None) -> float:
         distance_m = self._distance_to_latch(truth)
@@ -247,15 +250,16 @@ class DockingEnv(gymnasium.Env[Any, Any]):
         if self.observation == "state":
             return box(19)
         if self.observation == "pose":
-            return spaces.Dict(
-                {
-                    "pose": box(6),
-                    "pose_valid": spaces.Box(0.0, 1.0, (1,), np.float64),
-                    "long_range": box(4),
-                    "entrance": box(4),
-                    "proprioception": box(13),
-                }
-            )
+            parts: dict[str, spaces.Space[Any]] = {
+                "pose": box(6),
+                "pose_valid": spaces.Box(0.0, 1.0, (1,), np.float64),
+                "long_range": box(4),
+                "entrance": box(4),
+                "proprioception": box(13),
+            }
+            if self.cfg.station.rotating is not None:
+                parts["azimuth"] = box(7)
+            return spaces.Dict(parts)
         camera = self.cfg.camera
         return spaces.Dict(
             {
@@ -271,7 +275,10 @@ class DockingEnv(gymnasium.Env[Any, Any]):
         if self.observation == "image":
             image = self._image if self._image is not None else self._blank()
             return {"image": image.copy(), "proprioception": own}
-        return {**_percept_vectors(self._percept, self._world.camera.T_body_camera), "proprioception": own}
+        seen = {**_percept_vectors(self._percept, self._world.camera.T_body_camera), "proprioception": own}
+        if self.cfg.station.rotating is not None:
+            seen["azimuth"] = _azimuth_vector(self._fix, self.proprioception.time_s)
+        return seen
 
     def _state(self, truth: Truth) -> Array:
         R_station_world = self._world.simulator.T_world_station[:3, :3].T
@@ -316,3 +323,11 @@ def _percept_vectors(percept: Percept | None, T_body_camera: Array) -> dict[str,
             if bearing is not None:
                 rays[name] = np.append(bearing.ray_camera, bearing.score)
     return {"pose": pose, "pose_valid": valid, **rays}
+
+
+def _azimuth_vector(fix: AzimuthFix | None, now_s: float) -> Array:
+    """Last azimuth fix: sin A, cos A, sigma in rad, age in s, unit ray to the beacon at that time; 0 before any."""
+    if fix is None:
+        return np.zeros(7)
+    azimuth = [np.sin(fix.azimuth_rad), np.cos(fix.azimuth_rad), fix.sigma_rad, now_s - fix.time_s]
+    return np.clip(np.concatenate([azimuth, fix.bearing.ray_camera]), -BOUND, BOUND)

@@ -1,4 +1,7 @@
-"""`auvdock dock conical`: one episode with live progress, a result table, a recording or JSON."""
+"""`auvdock dock conical`: one episode with live progress, a result table, a recording or JSON.
+
+`run_dock` serves the other stations with a bow camera too.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ from auvdock.episode.runner import EpisodeRunner
 from auvdock.episode.trace import EpisodeObserver
 from auvdock.optics.gl import probe_gl
 
-__all__ = ["DockConical", "run_conical"]
+__all__ = ["DockConical", "run_conical", "run_dock"]
 
 
 @dataclass(frozen=True)
@@ -87,13 +90,22 @@ class DockConical:
                 world.setdefault("sim", {}).setdefault("current", {})["direction_deg"] = degrees
         if self.detector is not None:
             changes["perception"] = {"detector": self.detector}
-        return self.episode.override(changes)
+        return self.episode.override(changes).override(self.special())
+
+    def special(self) -> dict[str, Any]:
+        """Changes by flags of this station alone."""
+        return {}
 
 
 def run_conical(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
+    return run_dock(DockConical, argv, prog, "conical")
+
+
+def run_dock(command: type[DockConical], argv: Sequence[str], prog: str, station: str) -> int:
+    """Run a docking command whose flags are the fields of `command`, on the levels of `station`."""
     stored = _stored(argv)
-    args = parse(DockConical, argv, prog, _defaults(argv, stored))
+    args = parse(command, argv, prog, _defaults(command, argv, stored, station))
     if args.seed < 0:
         raise ConfigError("seed", args.seed, "a whole number of 0 or more")
     cv2.setNumThreads(1)  # frames this small gain nothing from OpenCV's threads and stall on a busy machine
@@ -132,10 +144,12 @@ def _stored(argv: Sequence[str]) -> StoredEpisode | None:
     return stored_episode(reference)
 
 
-def _defaults(argv: Sequence[str], stored: StoredEpisode | None) -> DockConical:
+def _defaults(
+    command: type[DockConical], argv: Sequence[str], stored: StoredEpisode | None, station: str
+) -> DockConical:
     if stored is not None:
-        return DockConical(seed=stored.spec.seed, episode=stored.cfg)
-    return DockConical() if {"-h", "--help"} & set(argv) else DockConical(episode=base_config(argv))
+        return command(seed=stored.spec.seed, episode=stored.cfg)
+    return command() if {"-h", "--help"} & set(argv) else command(episode=base_config(argv, station))
 
 
 def _tell_whether_equal(stored: StoredEpisode, result: EpisodeResult) -> None:

@@ -30,7 +30,7 @@ def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None
     return tyro.cli(cls, args=list(argv), prog=prog, description=doc, default=default, config=config)
 
 
-def base_config(argv: Sequence[str]) -> EpisodeCfg:
+def base_config(argv: Sequence[str], station: str = "conical") -> EpisodeCfg:
     """The configuration that `--level N` and `--config FILE` ask for; other flags then change single fields of it.
 
     Raises:
@@ -44,5 +44,5 @@ def base_config(argv: Sequence[str]) -> EpisodeCfg:
         level = int(found.level)
     except ValueError as error:
         raise ConfigError("level", found.level, "a whole number of 0 to 4") from error
-    cfg = level_cfg(level)
+    cfg = level_cfg(level, station)
     return cfg.override(read_toml(Path(found.config))) if found.config else cfg
