@@ -96,7 +96,7 @@ class WorldCfg:
     control_hz: float = 30.0
     """Commands a second."""
     station_heading: str = "surveyed"
-    """"surveyed", or "unknown": each episode then draws a datum in ±180° that is added to every compass reading, so that
+    """"surveyed", or "unknown": each episode then draws a datum in ±180° that is added to every compass reading, and
     the station's heading by that compass must be perceived."""
     clock: BeaconClockCfg = BeaconClockCfg()
     """Error of the vehicle's clock against the station's; it matters with a rotating beacon only."""

@@ -53,11 +53,13 @@ class Start:
         position_m: (3,) of the body in the world.
         quat_wxyz: (4,) attitude.
         current: the water's motion in this episode.
+        compass_datum_rad: added to every compass reading of the episode.
     """
 
     position_m: Array
     quat_wxyz: Array
     current: CurrentCfg
+    compass_datum_rad: float = 0.0
 
 
 class WorldSettings(Protocol):
@@ -97,8 +99,9 @@ class WorldSettings(Protocol):
 class VehicleWorld(ABC):
     """A vehicle, a station, the water between them and a camera.
 
-    Randomness is split by purpose: start pose and current, physics and sensors, camera. Changing what one of them
-    draws leaves the others as they were. A world for another kind of docking says where it starts and how it looks.
+    Randomness is split by purpose: start pose and current, physics and sensors, camera, clock and lost frames. Changing
+    what one of them draws leaves the others as they were. A world for another kind of docking says where it starts and
+    how it looks.
 
     Attributes:
         simulator: the truth.
@@ -139,6 +142,9 @@ class VehicleWorld(ABC):
     def _reset_camera(self, rng: np.random.Generator) -> None:
         """Start an episode's optics."""
 
+    def _reset_link(self, rng: np.random.Generator) -> None:  # noqa: B027 - most worlds have none
+        """Start an episode's clock error and what gets lost on the way to the computer; nothing by default."""
+
     @abstractmethod
     def _look(self, truth: Truth, proprioception: Proprioception) -> Sensed:
         """Take a frame, or what stands in for it."""
@@ -149,10 +155,18 @@ class VehicleWorld(ABC):
 
     def reset(self, seed: int) -> None:
         """Start a new episode; the seed alone decides everything that is drawn in it."""
-        start, physics, camera = (np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
+        children = np.random.SeedSequence(seed).spawn(4)
+        start, physics, camera, link = (np.random.default_rng(child) for child in children)
         drawn = self._draw_start(start)
-        self.simulator.reset(drawn.position_m, drawn.quat_wxyz, physics, current=drawn.current)
+        self.simulator.reset(
+            drawn.position_m,
+            drawn.quat_wxyz,
+            physics,
+            current=drawn.current,
+            compass_datum_rad=drawn.compass_datum_rad,
+        )
         self._reset_camera(camera)
+        self._reset_link(link)
         self._step_count = 0
         self._last_frame_step = -self._steps_per_frame
         self._latched_at_s = None

@@ -8,12 +8,14 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.core.beacons import BeaconLayout
 from auvdock.core.contracts import Proprioception
 from auvdock.core.transforms import quat_wxyz_from_euler_zyx
 from auvdock.envs.config import StartCfg, WorldCfg
 from auvdock.envs.vehicle_world import Sensed, Start, VehicleWorld, detection_model
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.sensing import BeaconSensor
+from auvdock.optics.station_clock import StationClock
 from auvdock.sim.truth import Truth
 
 __all__ = ["DockingWorld", "Sensed", "draw_start"]
@@ -21,6 +23,13 @@ __all__ = ["DockingWorld", "Sensed", "draw_start"]
 
 def draw_start(cfg: StartCfg, station_depth_m: float, rng: np.random.Generator) -> tuple[Array, Array]:
     """A start pose: position (3,) in the world and quaternion wxyz (4,), drawn uniformly within `cfg`."""
+    if cfg.ring:
+        radius = rng.uniform(cfg.min_range_m, cfg.max_range_m)
+        azimuth = math.radians(rng.uniform(-cfg.azimuth_deg, cfg.azimuth_deg))
+        z = rng.uniform(-cfg.vertical_m, cfg.vertical_m) - station_depth_m
+        yaw = azimuth + math.pi + math.radians(rng.uniform(-cfg.heading_deg, cfg.heading_deg))
+        place = np.array([radius * math.cos(azimuth), radius * math.sin(azimuth), z])
+        return place, quat_wxyz_from_euler_zyx(0.0, 0.0, yaw)
     x = rng.uniform(cfg.min_range_m, cfg.max_range_m)
     y = rng.uniform(-cfg.lateral_m, cfg.lateral_m)
     z = rng.uniform(-cfg.vertical_m, cfg.vertical_m) - station_depth_m
@@ -43,10 +52,12 @@ class DockingWorld(VehicleWorld):
         """
         super().__init__(cfg, cfg.station, "bow")
         self.cfg = cfg
+        self._clock: StationClock | None = None
+        self._loss_rng = np.random.default_rng(0)
         optics = (
             self.camera,
             self.water,
-            cfg.station.layout,
+            BeaconLayout(cfg.station.layout.beacons + cfg.extra_lights),
             cfg.nuisance,
             cfg.imaging,
             self.simulator.T_world_station,
@@ -63,15 +74,26 @@ class DockingWorld(VehicleWorld):
         current = self.cfg.sim.current
         if self.cfg.start.random_current_direction:
             current = dataclasses.replace(current, direction_deg=direction_deg)
-        return Start(position_m, quat_wxyz, current)
+        datum_rad = 0.0
+        if self.cfg.station_heading == "unknown":
+            datum_rad = float(rng.uniform(-math.pi, math.pi))
+        return Start(position_m, quat_wxyz, current, datum_rad)
 
     def _reset_camera(self, rng: np.random.Generator) -> None:
         (self._beacon_sensor or self.imager).reset(rng)
 
+    def _reset_link(self, rng: np.random.Generator) -> None:
+        clock_rng, self._loss_rng = rng.spawn(2)
+        self._clock = StationClock(self.cfg.clock, clock_rng) if self.cfg.station.rotating is not None else None
+
     def _look(self, truth: Truth, proprioception: Proprioception) -> Sensed:
+        if self.cfg.frame_drop_share > 0.0 and self._loss_rng.random() < self.cfg.frame_drop_share:
+            return Sensed(proprioception, None, None)
+        station_s = self._clock.station_time_s(truth.time_s) if self._clock is not None else None
         if self._beacon_sensor is not None:
-            return Sensed(proprioception, None, self._beacon_sensor.detect(truth.T_world_body, truth.time_s))
-        return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s), None)
+            detections = self._beacon_sensor.detect(truth.T_world_body, truth.time_s, station_s)
+            return Sensed(proprioception, None, detections)
+        return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s, station_s), None)
 
     def close(self) -> None:
         """Release the renderer."""

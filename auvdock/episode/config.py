@@ -10,13 +10,15 @@ from auvdock.assets import asset
 from auvdock.controllers.pilot import ControlCfg
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import merge, read_toml
-from auvdock.envs.config import WorldCfg
+from auvdock.envs.config import WorldCfg, rotating_world_cfg
 from auvdock.perception.pipeline import PerceptionCfg
 
-__all__ = ["LEVELS", "AnyEpisodeCfg", "EpisodeCfg", "level_cfg"]
+__all__ = ["LEVELS", "LEVEL_STATIONS", "AnyEpisodeCfg", "EpisodeCfg", "level_cfg"]
 
 LEVELS = (0, 1, 2, 3, 4)
-"""Difficulty levels; `assets/levels/level_N.toml` says what each changes."""
+"""Difficulty levels; `assets/levels/level_N.toml` (rotating beacon: `rotating_N.toml`) says what each changes."""
+LEVEL_STATIONS = ("conical", "rotating")
+"""Stations whose worlds are an `EpisodeCfg`."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +42,20 @@ AnyEpisodeCfg: TypeAlias = EpisodeCfg
 """Configuration of an episode of any kind of docking."""
 
 
-def level_cfg(level: int) -> EpisodeCfg:
+def level_cfg(level: int, station: str = "conical") -> EpisodeCfg:
     """The configuration of a difficulty level.
 
+    Args:
+        level: one of `LEVELS`.
+        station: "conical" (starts before the mouth) or "rotating" (starts all around, `rotating_world_cfg`).
+
     Raises:
-        ConfigError: no such level.
+        ConfigError: no such level or station.
     """
     if level not in LEVELS:
         raise ConfigError("level", level, f"one of {', '.join(map(str, LEVELS))}")
-    return EpisodeCfg().override(read_toml(asset("levels", f"level_{level}")))
+    if station == "conical":
+        return EpisodeCfg().override(read_toml(asset("levels", f"level_{level}")))
+    if station == "rotating":
+        return EpisodeCfg(world=rotating_world_cfg()).override(read_toml(asset("levels", f"rotating_{level}")))
+    raise ConfigError("station", station, f"one of {', '.join(LEVEL_STATIONS)}")

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from auvdock.controllers.pilot import ConicalPilot, Pilot
+from auvdock.controllers.rotating.pilot import RotatingPilot
 from auvdock.core.contracts import Percept
 from auvdock.envs.vehicle_world import Sensed
 from auvdock.envs.world import DockingWorld
@@ -86,7 +87,7 @@ class ConicalMetrics:
 
 
 def make_pilot(cfg: EpisodeCfg, world: DockingWorld) -> Pilot[Any]:
-    """The pilot that a configuration asks for."""
-    return ConicalPilot(
-        cfg.control, world.simulator.vehicle, cfg.world.station, world.camera, 1.0 / cfg.world.control_hz
-    )
+    """The rotating beacon's pilot if there is one or the station's heading is unknown, else the conical one."""
+    found_anywhere = cfg.world.station.rotating is not None or cfg.world.station_heading == "unknown"
+    kind = RotatingPilot if found_anywhere else ConicalPilot
+    return kind(cfg.control, world.simulator.vehicle, cfg.world.station, world.camera, 1.0 / cfg.world.control_hz)

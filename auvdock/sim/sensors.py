@@ -71,9 +71,10 @@ class Sensors:
         )
         self.reset(np.random.default_rng(0))
 
-    def reset(self, rng: np.random.Generator) -> None:
-        """Draw this episode's biases; `rng` then belongs to the sensors."""
+    def reset(self, rng: np.random.Generator, compass_datum_rad: float = 0.0) -> None:
+        """Draw this episode's biases; `rng` then belongs to the sensors, and the datum is added to the compass."""
         self._rng = rng
+        self._datum_rad = compass_datum_rad
         self._bias = self._bias_std * rng.standard_normal(13)
         self._scale = 1.0 + self._cfg.velocity_scale_error * float(rng.standard_normal())
 
@@ -95,7 +96,7 @@ class Sensors:
         relative: list[float] = nu_relative_body.tolist()
         scale = self._scale
         readings = [
-            (roll + error[1], pitch + error[2], math.remainder(yaw + error[3], 2.0 * math.pi)),
+            (roll + error[1], pitch + error[2], math.remainder(yaw + error[3] + self._datum_rad, 2.0 * math.pi)),
             (nu[3] + error[4], nu[4] + error[5], nu[5] + error[6]),
             (scale * nu[0] + error[7], scale * nu[1] + error[8], scale * nu[2] + error[9]),
             (scale * relative[0] + error[10], scale * relative[1] + error[11], scale * relative[2] + error[12]),

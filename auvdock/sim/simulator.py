@@ -147,6 +147,7 @@ class Simulator:
         rng: np.random.Generator,
         current: CurrentCfg | None = None,
         nu_relative_body: Array | None = None,
+        compass_datum_rad: float = 0.0,
     ) -> None:
         """Start an episode: at rest relative to the water unless told otherwise, actuators at rest, latch open.
 
@@ -156,6 +157,7 @@ class Simulator:
             rng: spawns one generator for the water and one for the sensors.
             current: in place of the configured one, for this episode.
             nu_relative_body: (6,) velocity through the water, body axes, m/s and rad/s; None is at rest.
+            compass_datum_rad: added to every compass reading of the episode.
 
         Raises:
             ValueError: wrong shapes, a quaternion of no length, or a state that is not finite or absurd.
@@ -173,7 +175,7 @@ class Simulator:
         water_rng, sensor_rng = rng.spawn(2)
         mujoco.mj_resetData(self.model, self._data)
         self._ocean.reset(current if current is not None else self.cfg.current, water_rng)
-        self._sensors.reset(sensor_rng)
+        self._sensors.reset(sensor_rng, compass_datum_rad)
         self._actuators.reset()
         self._dock.reset()
         self._qpos[:] = qpos
