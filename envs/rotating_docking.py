@@ -38,12 +38,12 @@ Chosen by `observation`; boxes are float64 and bounded by ±1000.
 
 | Key | Shape | Content |
 |---|---|---|
-| `azimuth` | (7,) | last azimuth fix: sin A, cos A, σ in rad, age in s, unit ray to the beacon then; 0 before the first |
+| `azimuth` | (7,) | last azimuth fix: sin A, cos A, σ in rad, age in s, unit ray to the beacon then; 0 if none |
 | `pose` | (6,) | camera in the station frame: x, y, z, roll, pitch, yaw of the body as perception sees it |
 | `pose_valid` | (1,) | 1 if measured in the newest frame, 0.5 if predicted, 0 if there is none (pose is then 0) |
 | `long_range` | (4,) | unit ray to the far light in the camera frame and its score; 0 if none |
 | `entrance` | (4,) | unit ray to the red entrance lamps and its score; 0 if none |
-| `proprioception` | (13,) | depth; roll, pitch, yaw (datum unknown); p, q, r; velocity over ground; velocity through water |
+| `proprioception` | (13,) | depth; roll, pitch, yaw (datum unknown); p, q, r; velocities over ground, through water |
 
 `"image"`: `Dict` of `image` (height, width, 3) uint8 from the bow camera, `proprioception` as above. One image does not
 tell the time: the newest frame's is that of the observation. Needs `fidelity="pixels"`.
