@@ -27,7 +27,7 @@ __all__ = ["BeaconFilter", "BeaconFilterCfg", "BeaconState", "Hypothesis", "Sigh
 class BeaconFilterCfg:
     """Noise levels and ranges of the filter bank; all ours."""
 
-    min_range_m: float = 4.0
+    min_range_m: float = 6.0
     """Nearest range that a first sight may have."""
     max_range_m: float = 75.0
     """Farthest one."""
@@ -107,6 +107,7 @@ class BeaconState(NamedTuple):
         restarts: how often the bank began anew.
         beacon_depth_m: depth of the beacon.
         depth_variance_m2: its variance.
+        range_sigma_m: standard deviation along the line of sight as of the last fix.
     """
 
     bank: tuple[Hypothesis, ...]
@@ -117,6 +118,7 @@ class BeaconState(NamedTuple):
     restarts: int
     beacon_depth_m: float
     depth_variance_m2: float
+    range_sigma_m: float = math.inf
 
     @property
     def offset_m(self) -> tuple[float, float]:
@@ -158,16 +160,6 @@ class BeaconState(NamedTuple):
             gap[2] = math.remainder(gap[2], math.tau)
             total += h.weight * (h.covariance + np.outer(gap, gap))
         return total
-
-    @property
-    def range_sigma_m(self) -> float:
-        """Standard deviation along the line of sight, as of the last fix."""
-        x, y = self.offset_m
-        length = math.hypot(x, y)
-        if length < 1e-6:
-            return math.inf
-        ray = np.array([x / length, y / length])
-        return math.sqrt(max(float(ray @ self.covariance[:2, :2] @ ray), 0.0))
 
 
 class BeaconFilter:
@@ -213,15 +205,17 @@ class BeaconFilter:
         middle = sum(self._ranges) / len(self._ranges)
         depth = sighting.depth_m - middle * math.tan(sighting.elevation_rad)
         spread = 0.6 * middle * math.tan(sighting.elevation_rad)
-        return BeaconState(
-            tuple(bank), (0.0, 0.0), 0.0, 1, 0, restarts, depth, spread**2 + (middle * cfg.elevation_floor_rad) ** 2
+        return _measured(
+            BeaconState(
+                tuple(bank), (0.0, 0.0), 0.0, 1, 0, restarts, depth, spread**2 + (middle * cfg.elevation_floor_rad) ** 2
+            )
         )
 
     def place(self, offset_m: tuple[float, float], axis_yaw_rad: float, depth_m: float, sigma_m: float) -> BeaconState:
         """A bank of one from a known place, as the array's poses give it; `sigma_m` is its standard deviation."""
         covariance = np.diag([sigma_m**2, sigma_m**2, 0.02**2])
         mean = (offset_m[0], offset_m[1], axis_yaw_rad)
-        return BeaconState((Hypothesis(1.0, mean, covariance),), (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2)
+        return BeaconState((Hypothesis(1.0, mean, covariance),), (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2, sigma_m)
 
     def predict(self, state: BeaconState, ground_compass_m_s: tuple[float, float]) -> BeaconState:
         """Dead reckoning over one control period with the velocity over ground in level compass axes."""
@@ -263,7 +257,7 @@ class BeaconFilter:
             for chance, h in kept
         )
         after = state._replace(bank=bank, moved_m=(0.0, 0.0), since_fix_s=0.0, fixes=state.fixes + 1, refused=0)
-        return self._depth(after, sighting, since)
+        return self._depth(_measured(after), sighting, since)
 
     def _depth(self, state: BeaconState, sighting: Sighting, since_s: float) -> BeaconState:
         """Scalar Kalman update of the beacon's depth: z = depth − R tan(elevation)."""
@@ -277,6 +271,16 @@ class BeaconFilter:
             beacon_depth_m=state.beacon_depth_m + gain * (measured - state.beacon_depth_m),
             depth_variance_m2=(1.0 - gain) * variance,
         )
+
+
+def _measured(state: BeaconState) -> BeaconState:
+    """The state with its uncertainty along the line of sight; worked out once a fix, since it is asked for often."""
+    x, y = state.offset_m
+    length = math.hypot(x, y)
+    if length < 1e-6:
+        return state._replace(range_sigma_m=math.inf)
+    ray = np.array([x / length, y / length])
+    return state._replace(range_sigma_m=math.sqrt(max(float(ray @ state.covariance[:2, :2] @ ray), 0.0)))
 
 
 def _update(

@@ -10,7 +10,7 @@
 | approach, circle | lineup | in the cone before the mouth |
 | lineup | circle | outside of twice that cone |
 | lineup | far | no fix for `lineup_blind_s`, but a fixed lamp is seen steadily where the station should be |
-| lineup | abort | nearer than `min_blind_m` and still no pose, or `lineup_timeout_s` is over |
+| lineup | abort | surely nearer than `min_blind_m` and still no pose, or `lineup_timeout_s` is over |
 | approach, circle, lineup | acquire | no fix for `lost_s` |
 
 From far, mid and on the conical table (`auvdock.controllers.modes`) holds, but for its way back to acquire, which leads
@@ -73,7 +73,7 @@ class RotatingFacts(NamedTuple):
         range_share: standard deviation of the range over the range.
         off_axis_rad: magnitude of the vehicle's azimuth, infinite without a beacon.
         cone_rad: half angle of the cone before the mouth.
-        ahead_m: camera before the mouth along the axis.
+        ahead_m: camera before the mouth along the axis, at most: two standard deviations farther than believed.
         has_pose: confirmed, fresh poses of the array that agree with the beacon.
         lamp: a fixed lamp is seen steadily where the station should be.
         in_mode_s: time in this mode.

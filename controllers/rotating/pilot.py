@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from auvdock.controllers.modes import ABORT, ACQUIRE, DOCKED, FAR, MID, next_mode
 from auvdock.controllers.pilot import ConicalPilot, ControlCfg, PilotState
 from auvdock.controllers.rotating.beacon_filter import BeaconFilter, BeaconState, Sighting
@@ -20,7 +22,7 @@ from auvdock.controllers.rotating.steering import look_around, steer_course
 from auvdock.controllers.senses import Senses, Vector, cross, read_senses, rotate, turn
 from auvdock.controllers.steering import Place, Steering
 from auvdock.core.camera import Camera
-from auvdock.core.contracts import AzimuthFix, Command, Percept, Proprioception
+from auvdock.core.contracts import BLUE, AzimuthFix, Bearing, Command, Percept, Proprioception
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.vehicle import VehicleCfg
 
@@ -44,6 +46,22 @@ class Step(NamedTuple):
     depth_m: float
 
 
+class Hunt(NamedTuple):
+    """Progress of a search.
+
+    Attributes:
+        clock_s: time spent turning; it stands still during a hold.
+        hold_s: when the present hold began, None without one.
+        hold_rad: compass bearing of the light that is being watched.
+        free_s: no new hold before the clock shows this.
+    """
+
+    clock_s: float = 0.0
+    hold_s: float | None = None
+    hold_rad: float = 0.0
+    free_s: float = 0.0
+
+
 class RotatingState(NamedTuple):
     """All that the pilot remembers; immutable.
 
@@ -55,6 +73,7 @@ class RotatingState(NamedTuple):
         look_s: when the present look for the beacon began, None on the way.
         missed: the last look has found nothing.
         believed: the present search began with a beacon believed somewhere.
+        hunt: progress of the present search.
     """
 
     flight: PilotState
@@ -64,6 +83,7 @@ class RotatingState(NamedTuple):
     look_s: float | None
     missed: bool
     believed: bool
+    hunt: Hunt
 
     @property
     def mode(self) -> str:
@@ -100,11 +120,12 @@ class RotatingPilot:
         self._beacon = station.rotating
         self._beacon_m = station.rotating.position_m if station.rotating is not None else (0.0, 0.0, 0.0)
         self._filter = BeaconFilter(cfg.rotating.filter, dt_s)
+        self._camera = camera
         self._dt_s = dt_s
 
     def initial_state(self) -> RotatingState:
         """Searching, with nothing known."""
-        return RotatingState(self.conical.initial_state(), None, (), 0.0, None, False, False)
+        return RotatingState(self.conical.initial_state(), None, (), 0.0, None, False, False, Hunt())
 
     def step(
         self, state: RotatingState, percept: Percept | None, proprioception: Proprioception
@@ -128,6 +149,8 @@ class RotatingPilot:
         if wanted not in ROTATING_MODES:
             command, flight = self.conical.fly(state.flight, place, senses)
             return command, state._replace(flight=flight)
+        if wanted == ACQUIRE:
+            state = state._replace(hunt=self._watch(state, percept, senses))
         steering, state = self._steer(state, senses)
         command, flight = self.conical.act(state.flight, steering, place, senses)
         self._log(command, state)
@@ -217,7 +240,7 @@ class RotatingPilot:
             range_share=beacon.range_sigma_m / max(beacon.range_m, 1e-3) if flight.mode == APPROACH else 0.0,
             off_axis_rad=abs(beacon.azimuth_rad),
             cone_rad=self.cfg.rotating.route.cone_rad,
-            ahead_m=self._station_m(beacon)[0],
+            ahead_m=self._station_m(beacon)[0] + 2.0 * beacon.range_sigma_m,
             has_pose=has_pose,
             lamp=lamp,
             in_mode_s=in_mode_s,
@@ -244,7 +267,7 @@ class RotatingPilot:
                 beacon = None
             anchor = beacon.bearing_rad if beacon is not None else senses.yaw_rad
             flight = flight._replace(anchor_rad=anchor)
-            state = state._replace(believed=beacon is not None)
+            state = state._replace(believed=beacon is not None, hunt=Hunt())
         if mode in (FAR, MID, ABORT, DOCKED, ACQUIRE):
             state = state._replace(missed=False, look_s=None)
         return state._replace(flight=flight, beacon=beacon)
@@ -302,8 +325,34 @@ class RotatingPilot:
         if beacon is not None and beacon.since_fix_s < cfg.modes.lineup_blind_s:
             # Found: wait for the next pass with the beacon in the middle of the image.
             return look_around(0.0, beacon.bearing_rad, senses.depth_m, 1.0, True, cfg.look)
-        in_mode_s = senses.time_s - (flight.since_s or 0.0)
-        return look_around(in_mode_s, flight.anchor_rad, flight.anchor_depth_m, flight.side, state.believed, cfg.look)
+        hunt = state.hunt
+        if hunt.hold_s is not None:
+            return look_around(0.0, hunt.hold_rad, flight.anchor_depth_m, 1.0, True, cfg.look)
+        return look_around(
+            hunt.clock_s, flight.anchor_rad, flight.anchor_depth_m, flight.side, state.believed, cfg.look
+        )
+
+    def _watch(self, state: RotatingState, percept: Percept | None, senses: Senses) -> Hunt:
+        """Stop turning at the glimpse of a light: the next passes tell whether it is the beacon."""
+        hunt, look = state.hunt, self.cfg.rotating.look
+        if hunt.hold_s is not None:
+            if senses.time_s - hunt.hold_s < look.hold_s:
+                return hunt
+            return hunt._replace(hold_s=None, free_s=hunt.clock_s + look.hold_gap_rad / look.turn_rate_rad_s)
+        hunt = hunt._replace(clock_s=hunt.clock_s + self._dt_s)
+        if percept is None or self._beacon is None or hunt.clock_s < hunt.free_s:
+            return hunt
+        seen = percept.detections
+        blue = np.flatnonzero(seen.class_id == BLUE)
+        if len(blue) == 0:
+            return hunt
+        best = int(blue[int(np.argmax(seen.score[blue]))])
+        if float(seen.score[best]) < look.hold_score:
+            return hunt
+        x, y = self._camera.normalise(seen.centre_px[best : best + 1])[0].tolist()
+        glimpse = Bearing(np.array([x, y, 1.0]), seen.centre_px[best], float(seen.score[best]))
+        bearing, _ = self.conical.compass_direction(glimpse, senses)
+        return hunt._replace(hold_s=senses.time_s, hold_rad=bearing) if math.isfinite(bearing) else hunt
 
     def _log(self, command: Command, state: RotatingState) -> None:
         """What is believed of the beacon, for the log."""

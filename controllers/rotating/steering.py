@@ -17,12 +17,19 @@ __all__ = ["CourseCfg", "LookAroundCfg", "look_around", "steer_course"]
 class LookAroundCfg:
     """The look around for the beacon; ours.
 
-    At 0.5 rev/s the beam comes by every 2 s, and the camera sees 85°: at 0.2 rad/s (11.5°/s) a direction stays in the
-    image for 7.4 s, in which the beam passes at least three times, enough to tell it from a steady light.
+    At 0.5 rev/s the beam comes by every 2 s, and the camera sees 85°: at 0.35 rad/s (20°/s) a direction stays in the
+    image for 4.2 s, in which the beam passes twice. The turn stops at the first glimpse of a light and watches it for
+    `hold_s`, in which a beacon shows itself by passing again.
     """
 
-    turn_rate_rad_s: float = 0.2
+    turn_rate_rad_s: float = 0.35
     """Rate of the turn."""
+    hold_s: float = 8.0
+    """Watch a light that appeared for so long: four turns of the beacon."""
+    hold_gap_rad: float = 0.9
+    """Turn on by so much after a light that was watched in vain."""
+    hold_score: float = 0.3
+    """Least score of a light that is worth it."""
     settle_s: float = 1.0
     """Wait before the first turn."""
     believed_s: float = 7.0
@@ -37,7 +44,7 @@ class LookAroundCfg:
     def __post_init__(self) -> None:
         """All are positive, but for the waits and the step."""
         for name, value in vars(self).items():
-            low = 0.0 if name in ("settle_s", "believed_s", "depth_step_m") else 1e-6
+            low = 0.0 if name in ("settle_s", "believed_s", "depth_step_m", "hold_score") else 1e-6
             if not (math.isfinite(value) and value >= low):
                 raise ConfigError(f"control.rotating.look.{name}", value, "a value above 0")
 
