@@ -12,6 +12,7 @@ from auvdock.envs.vehicle_world import Sensed
 from auvdock.envs.world import DockingWorld
 from auvdock.episode.config import EpisodeCfg
 from auvdock.episode.metrics import GuidanceMetrics
+from auvdock.episode.rotating_metrics import RotatingMetrics
 from auvdock.episode.trace import Tick
 from auvdock.perception.detectors import make_detector
 from auvdock.perception.pipeline import BeaconPerception
@@ -56,7 +57,11 @@ class ConicalTask:
 
     def metrics(self) -> ConicalMetrics:
         """Metrics of a new episode."""
-        return ConicalMetrics(GuidanceMetrics(self.world.camera, self.station, self.world.simulator.T_world_station))
+        camera, T_world_station = self.world.camera, self.world.simulator.T_world_station
+        rotating = None
+        if isinstance(self.pilot, RotatingPilot):
+            rotating = RotatingMetrics(camera, T_world_station, self.station.rotating)
+        return ConicalMetrics(GuidanceMetrics(camera, self.station, T_world_station), rotating)
 
     def stage(self, mode: str) -> str:
         """The failure reason of an episode that ends in a guidance mode."""
@@ -64,14 +69,16 @@ class ConicalTask:
 
 
 class ConicalMetrics:
-    """Precise guidance as paper A counts it, and how the nose passed the throat."""
+    """Precise guidance as paper A counts it, how the nose passed the throat, and how the rotating beacon led."""
 
-    def __init__(self, guidance: GuidanceMetrics) -> None:
+    def __init__(self, guidance: GuidanceMetrics, rotating: RotatingMetrics | None = None) -> None:
         """Start empty."""
-        self._guidance = guidance
+        self._guidance, self._rotating = guidance, rotating
 
     def add(self, tick: Tick) -> None:
-        """Count one control period; those without a frame count nothing."""
+        """Count one control period; for guidance those without a frame count nothing."""
+        if self._rotating is not None:
+            self._rotating.add(tick)
         if tick.percept is not None:
             self._guidance.add(tick.truth, tick.percept)
 
@@ -83,6 +90,7 @@ class ConicalMetrics:
             "vertical_error_m": truth.entry_vertical_m,
             "heading_error_rad": truth.entry_angle_rad,
             "entry_speed_m_s": truth.entry_speed_m_s,
+            **(self._rotating.fields() if self._rotating is not None else {}),
         }
 
 

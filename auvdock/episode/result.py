@@ -12,6 +12,9 @@ __all__ = ["FAILURE_REASONS", "EpisodeResult"]
 
 FAILURE_REASONS = (
     "search",
+    "approach",
+    "circle",
+    "lineup",
     "far",
     "mid",
     "near",
@@ -74,6 +77,20 @@ class EpisodeResult:
     """auvdock, mujoco, numpy, opencv and Python versions."""
     config: Mapping[str, Any]
     """The resolved configuration."""
+    start_azimuth_rad: float | None = None
+    """Rotating beacon: azimuth of the start about the beacon; beyond ±π/2 it lies behind the station."""
+    start_range_m: float | None = None
+    """Rotating beacon: distance of the start."""
+    acquire_s: float | None = None
+    """Rotating beacon: when the first azimuth or the first measured pose came."""
+    first_pose_s: float | None = None
+    """Rotating beacon: when the first measured pose came."""
+    azimuth_fixes: int | None = None
+    """Rotating beacon: azimuths measured."""
+    azimuth_rms_rad: float | None = None
+    """Rotating beacon: their root mean square error."""
+    handover_azimuth_error_rad: float | None = None
+    """Rotating beacon: error of the believed azimuth when the array's or the far lamp's light took over."""
 
     WALL_CLOCK_FIELDS = ("wall_s", "real_time_factor")
 
