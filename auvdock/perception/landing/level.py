@@ -17,6 +17,7 @@ from auvdock.perception.landing.config import AttitudeCfg
 __all__ = ["LevelPose", "LevelSolver", "pose_offset", "rotated"]
 
 _MAX_ITERATIONS = 20
+_DECREMENT = 1e-8
 _NO_ROTATION = np.zeros(3)
 
 
@@ -62,6 +63,7 @@ class LevelSolver:
         self._distortion = np.ascontiguousarray(camera.distortion)
         self._tilt = 1.0 / (math.radians(cfg.tilt_noise_deg) ** 2 + math.radians(cfg.tilt_bias_deg) ** 2)
         self._heading = 1.0 / math.radians(cfg.heading_deg) ** 2
+        self._level = self._tilt * np.eye(3)
 
     def solve(
         self,
@@ -91,21 +93,19 @@ class LevelSolver:
         for _ in range(_MAX_ITERATIONS):
             evaluated = self._evaluate(points_m, pixels, sigma_px, attitude, *trial)
             if evaluated is not None and evaluated[0] <= best:
-                done = best - evaluated[0] < 1e-9 * (1.0 + best)
                 best, (position, rotation), kept, damping = evaluated[0], trial, evaluated[1:], damping * 0.1
-                if done:
-                    break
             elif kept is None:
                 return None
             else:
                 damping = max(10.0 * damping, 1e-3)
             normal, gradient = kept[0] + kept[2], kept[1] + kept[3]
-            damped = normal + np.diag(damping * normal.diagonal())
+            damped = normal + np.diag(damping * normal.diagonal()) if damping > 1e-9 else normal
             try:
                 step: Array = -np.linalg.solve(damped, gradient).astype(np.float64)
             except np.linalg.LinAlgError:
                 return None
-            if float(step @ normal @ step) < 1e-12:
+            # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
+            if damping <= 1e-9 and -float(gradient @ step) < _DECREMENT:
                 break
             trial = (position + step[:3], rotated(rotation, step[3:]))
         if kept is None:
@@ -146,15 +146,16 @@ class LevelSolver:
         du = by_q[:, 3:6].reshape(n, 2, 3)
         jacobian = np.empty((n, 2, 6))
         jacobian[:, :, :3] = -du @ rotation.T
-        # q = Rᵀ (X - p), R → R exp([δθ]): dq = q × δθ.
-        jacobian[:, :, 3:] = np.cross(du, q[:, None, :])
+        # q = Rᵀ (X - p), R → R exp([δθ]): dq = q × δθ, so du/dq dq = (du/dq × q) δθ.
+        (x, y, z), (a, b, c) = q.T[:, :, None], du.transpose(2, 0, 1)
+        jacobian[:, :, 3], jacobian[:, :, 4], jacobian[:, :, 5] = b * z - c * y, c * x - a * z, a * y - b * x
         flat = (jacobian / sigma[:, None, None]).reshape(2 * n, 6)
         weighted = (difference / sigma[:, None]).reshape(-1)
         information, gradient = flat.T @ flat, flat.T @ weighted
         turn = pose_turn(attitude, rotation)
         up = rotation[2]
         prior = np.zeros((6, 6))
-        prior[3:, 3:] = self._tilt * np.eye(3) + (self._heading - self._tilt) * np.outer(up, up)
+        prior[3:, 3:] = self._level + (self._heading - self._tilt) * (up[:, None] * up)
         pulled = prior[:, 3:] @ turn
         cost = float(weighted @ weighted) + float(turn @ pulled[3:])
         if not math.isfinite(cost):

@@ -105,7 +105,8 @@ class LandingPerception:
         self._tracks.update(detections)
         self._filter.predict(proprioception)
         attitude = self._filter.measured_attitude(proprioception)
-        tag = self._tag.measure(tags, attitude) if cfg.levels != "lights" else None
+        expected = self._filter.pose(proprioception)[0] if self._filter.running else None
+        tag = self._tag.measure(tags, attitude, expected) if cfg.levels != "lights" else None
         named = self._name(detections, attitude, proprioception) if cfg.levels != "tag" else None
         lights = named.pose if named is not None else None
         used_lights, used_tag = self._fuse(lights, tag, proprioception)

@@ -17,6 +17,8 @@ from auvdock.perception.landing.level import LevelPose, LevelSolver
 
 __all__ = ["TagLevel", "tag_corners_m"]
 
+_SURE = 25.0
+"""χ² of a pose that needs no rival: eight residuals and three of attitude, less six unknowns."""
 _MARGIN = 0.6
 _MARGIN_PX = 12.0
 
@@ -54,17 +56,18 @@ class TagLevel:
             np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), self._centre_m
         )
 
-    def measure(self, tags: Sequence[TagDetection], attitude: Array) -> LevelPose | None:
+    def measure(self, tags: Sequence[TagDetection], attitude: Array, expected: Array | None = None) -> LevelPose | None:
         """The pose of one frame, None without the tag or where its corners fit no pose.
 
         Args:
             tags: what the detector saw; other numbers than the station's are ignored.
             attitude: (3, 3) R_station_camera by inclinometer and compass.
+            expected: (4, 4) T_station_camera where the filter expects the camera; tried first.
         """
         best: LevelPose | None = None
         for tag in tags:
             if tag.tag_id == self._tag.tag_id:
-                pose = self._pose(tag, attitude)
+                pose = self._pose(tag, attitude, expected)
                 if pose is not None and (best is None or pose.cost < best.cost):
                     best = pose
         return best
@@ -87,9 +90,14 @@ class TagLevel:
         x1, y1 = np.minimum(np.ceil(high + margin), size).astype(int).tolist()
         return RegionOfInterest(x0, y0, max(x0, x1), max(y0, y1))
 
-    def _pose(self, tag: TagDetection, attitude: Array) -> LevelPose | None:
+    def _pose(self, tag: TagDetection, attitude: Array, expected: Array | None) -> LevelPose | None:
         xy = self._camera.normalise(tag.corners_px)
         sigma = np.full(4, tag.sigma_px)
+        if expected is not None:
+            # The attitude's share of the cost tells the wrong of a square's two poses: it is tens of degrees off.
+            tracked = self._solver.solve(self._corners_m, tag.corners_px, sigma, attitude, expected, (), "tracked")
+            if tracked is not None and tracked.cost < _SURE:
+                return tracked
         found = [
             self._solver.solve(self._corners_m, tag.corners_px, sigma, attitude, start, (), name)
             for start, name in self._starts(xy, attitude)

@@ -68,13 +68,14 @@ class AprilTagDetector:
             scale = 2.0 if min(patch.shape) < _SMALL_PX else 1.0
             searched = cv2.resize(patch, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_CUBIC) if scale > 1.0 else patch
             corners, ids, _ = self._detector.detectMarkers(searched)
-            # Without a tag `ids` is None, which OpenCV's stubs do not say; `corners` is then empty.
+            # Without a tag `ids` may be None, which OpenCV's stubs do not say; `corners` is then empty.
+            numbers = np.asarray(ids).ravel()
             for index, quad in enumerate(corners):
                 # Pixel centres have integer coordinates, enlarged ones lie between.
                 rough = (np.asarray(quad, dtype=np.float64).reshape(4, 2) + 0.5) / scale - 0.5 + origin
                 refined = refined_corners(grey, rough, frame.camera)
                 if refined is not None:
-                    found.append(TagDetection(int(ids[index, 0]), *refined))
+                    found.append(TagDetection(int(numbers[index]), *refined))
         return tuple(found)
 
 
