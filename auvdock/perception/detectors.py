@@ -10,11 +10,12 @@ from typing import Any, TypeVar, cast
 from auvdock.core.contracts import Detector
 from auvdock.core.errors import ConfigError
 from auvdock.perception.blob import BlobCfg, BlobDetector
+from auvdock.perception.landing.cores import CoreCfg, CoreDetector
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
 __all__ = ["DETECTORS", "make_detector"]
 
-DETECTORS = ("threshold", "blob")
+DETECTORS = ("threshold", "blob", "cores")
 """Names of the package's own detectors; anything with a colon is looked up as "package.module:Name"."""
 
 
@@ -22,7 +23,7 @@ def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
     """A detector by name.
 
     Args:
-        name: "threshold", "blob", or "package.module:Name" for a class or factory of your own.
+        name: "threshold", "blob", "cores" (near lights), or "package.module:Name" for a class or factory of your own.
         settings: fields of the detector's configuration; keyword arguments of your own class.
 
     Raises:
@@ -32,6 +33,8 @@ def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
         return ThresholdDetector(_configure(ThresholdCfg, settings))
     if name == "blob":
         return BlobDetector(_configure(BlobCfg, settings))
+    if name == "cores":
+        return CoreDetector(_configure(CoreCfg, settings))
     if ":" not in name:
         raise ConfigError("detector", name, f"one of {', '.join(DETECTORS)}, or your own as package.module:Name")
     return _foreign(name, settings)

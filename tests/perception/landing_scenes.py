@@ -71,8 +71,8 @@ class Senses:
 
     descent: Descent
     rng: np.random.Generator
-    light_sigma_px: float = 0.5
-    tag_sigma_px: float = 0.2
+    light_sigma_px: float = 0.15
+    tag_sigma_px: float = 0.1
     sensors: Sensors = field(default_factory=lambda: Sensors(SensorCfg()))
 
     def __post_init__(self) -> None:

@@ -39,9 +39,9 @@ class AttitudeCfg:
 class LightLevelCfg:
     """Level I: the lights."""
 
-    centre_sigma_px: float = 0.5
-    """Standard deviation of a point-like light's centre, per axis."""
-    centre_sigma_widths: float = 0.05
+    centre_sigma_px: float = 0.15
+    """Standard deviation of a small light's centre, per axis; ours, from rendered frames with a margin of two."""
+    centre_sigma_widths: float = 0.005
     """In addition this share of the box's width: the halo of a near light is not round (paper C, section 2.2)."""
     max_reprojection_px: float = 2.0
     """A mean reprojection error above this, in units of σ where that is above 1 px, means wrong identities."""
@@ -121,7 +121,7 @@ class LandingPerceptionCfg:
     """How a landing vehicle sees."""
 
     detector: str = "threshold"
-    """Of lights: "threshold", "blob" or your own as "package.module:Name"."""
+    """Of lights: "cores" (for near lights), "threshold", "blob" or your own as "package.module:Name"."""
     tag_detector: str = "apriltag"
     """Of the tag: "apriltag", or "contour" (paper C's way: Canny, contours, quadrilateral)."""
     levels: str = "both"

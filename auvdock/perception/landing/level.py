@@ -54,7 +54,9 @@ class LevelSolver:
     """Levenberg–Marquardt over (position, rotation) for one camera.
 
     χ² = Σ |u_i - π(Rᵀ (X_i - p))|² / σ_i² + φᵀ Λ φ with φ = log(R_mᵀ R) the rotation from the measured attitude R_m:
-    the inclinometer is known to some tenths of a degree, the compass about the station's vertical only roughly.
+    the inclinometer is known to some tenths of a degree, the compass about the station's vertical only roughly. Where
+    χ² is more than its degrees of freedom, the pixels are worse than their σ says, and their information is divided by
+    the ratio (Birge 1932).
     """
 
     def __init__(self, cfg: AttitudeCfg, camera: Camera) -> None:
@@ -122,6 +124,9 @@ class LevelSolver:
         solver: str,
     ) -> LevelPose | None:
         information, gradient, prior, _, residual, _ = kept
+        # 2 n residuals and three of attitude, less six unknowns.
+        worse = max(1.0, cost / (2 * len(sigma_px) - 3))
+        information, gradient = information / worse, gradient / worse
         try:
             covariance = np.linalg.inv(information + prior)
             # Three points may leave a direction open: a trace of information keeps the inverse finite.

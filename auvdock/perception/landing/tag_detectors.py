@@ -64,7 +64,7 @@ class AprilTagDetector:
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
         """Detect in the whole frame, or only in the given regions when there are any."""
         found: list[TagDetection] = []
-        for patch, origin, grey in _patches(frame, regions):
+        for patch, origin in _patches(frame, regions):
             scale = 2.0 if min(patch.shape) < _SMALL_PX else 1.0
             searched = cv2.resize(patch, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_CUBIC) if scale > 1.0 else patch
             corners, ids, _ = self._detector.detectMarkers(searched)
@@ -73,7 +73,7 @@ class AprilTagDetector:
             for index, quad in enumerate(corners):
                 # Pixel centres have integer coordinates, enlarged ones lie between.
                 rough = (np.asarray(quad, dtype=np.float64).reshape(4, 2) + 0.5) / scale - 0.5 + origin
-                refined = refined_corners(grey, rough, frame.camera)
+                refined = refined_corners(frame, rough)
                 if refined is not None:
                     found.append(TagDetection(int(numbers[index]), *refined))
         return tuple(found)
@@ -89,7 +89,7 @@ class ContourTagDetector:
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
         """Detect in the whole frame, or only in the given regions when there are any."""
         found: dict[int, TagDetection] = {}
-        for patch, origin, _ in _patches(frame, regions):
+        for patch, origin in _patches(frame, regions):
             smooth = np.asarray(cv2.medianBlur(cv2.GaussianBlur(patch, (3, 3), 0.0), 3), dtype=np.uint8)
             high, _ = cv2.threshold(smooth, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
             edges = cv2.Canny(smooth, 0.4 * high, 0.8 * high)
@@ -123,13 +123,13 @@ class ContourTagDetector:
         return (int(number), int(turns)) if read else None
 
 
-def _patches(frame: Frame, regions: Sequence[RegionOfInterest]) -> list[tuple[Image, Array, Image]]:
-    """(grey patch, (2,) its origin in the image, whole grey image) of each region."""
+def _patches(frame: Frame, regions: Sequence[RegionOfInterest]) -> list[tuple[Image, Array]]:
+    """(grey patch, (2,) its origin in the image) of each region."""
     grey = np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
     if not regions:
-        return [(grey, np.zeros(2), grey)]
+        return [(grey, np.zeros(2))]
     return [
-        (np.ascontiguousarray(grey[r.y0 : r.y1, r.x0 : r.x1]), np.array([float(r.x0), float(r.y0)]), grey)
+        (np.ascontiguousarray(grey[r.y0 : r.y1, r.x0 : r.x1]), np.array([float(r.x0), float(r.y0)]))
         for r in regions
         if r.x1 - r.x0 >= _MIN_REGION_PX and r.y1 - r.y0 >= _MIN_REGION_PX
     ]

@@ -6,9 +6,11 @@ import math
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from auvdock.core.arrays import Array, Image
+from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
+from auvdock.core.contracts import Frame
 
 __all__ = ["corners_from_lines", "line_through", "refined_corners"]
 
@@ -17,29 +19,32 @@ _CELLS = 8
 _FROM, _TO = 0.08, 0.92
 """Part of each side that is used: blur rounds the corners."""
 _STEP_PX = 0.25
+_AROUND_PX = 12
 _PASSES = 2
 _FLOOR_PX = 0.03
 """Least standard deviation of a corner, ours: interpolation and blur that differs on the two sides of an edge."""
 
 
-def refined_corners(grey: Image, corners_px: Array, camera: Camera) -> tuple[Array, float] | None:
+def refined_corners(frame: Frame, corners_px: Array) -> tuple[Array, float] | None:
     """((4, 2) corners in pixels, standard deviation per axis) from corners good to a cell; None without four edges.
 
-    Across each side the edge is where the centre of the brightness gradient lies. The lines are fitted to undistorted
+    Across each side the edge is where the centre of the gradient of light lies: codes are made linear first, for in a
+    root of it black grows into white by a third of a pixel. The lines are fitted to undistorted
     points, where straight sides are straight, and their intersections projected back. A corner is the end of two lines
     of N points with residual σ, so its standard deviation is 2 σ / √N (the end of a regression line).
 
     Args:
-        grey: (H, W) the image, black square on white.
+        frame: the image, black square on white.
         corners_px: (4, 2) rough corners, clockwise in the image.
-        camera: whose distortion to take out.
     """
+    camera = frame.camera
+    light, origin = _light_around(frame, corners_px)
     corners, variance = corners_px, 0.0
     for _ in range(_PASSES):
         lines: list[tuple[Array, Array]] = []
         variance = 0.0
         for side in range(4):
-            points = _edge_points(grey, corners[side], corners[(side + 1) % 4])
+            points = _edge_points(light, origin, corners[side], corners[(side + 1) % 4])
             if points is None:
                 return None
             fitted = line_through(camera.normalise(points))
@@ -88,7 +93,17 @@ def line_through(points: Array) -> tuple[Array, Array, float, int] | None:
     return None
 
 
-def _edge_points(grey: Image, start: Array, end: Array) -> Array | None:
+def _light_around(frame: Frame, corners_px: Array) -> tuple[NDArray[np.float32], Array]:
+    """(linear light (h, w) around the corners, (2,) the patch's first column and row)."""
+    height, width = frame.image.shape[:2]
+    x0, y0 = np.maximum(np.floor(corners_px.min(axis=0)).astype(int) - _AROUND_PX, 0).tolist()
+    x1, y1 = (np.ceil(corners_px.max(axis=0)).astype(int) + _AROUND_PX + 1).tolist()
+    patch = np.ascontiguousarray(frame.image[y0 : min(y1, height), x0 : min(x1, width)])
+    electrons = cv2.LUT(patch, frame.response.electrons(frame.gain).astype(np.float32))
+    return np.asarray(electrons, dtype=np.float32).sum(axis=2), np.array([float(x0), float(y0)])
+
+
+def _edge_points(light: NDArray[np.float32], origin: Array, start: Array, end: Array) -> Array | None:
     """(n, 2) sub-pixel points of the edge from black to white along one side; None where there is none."""
     side = end - start
     length = float(np.linalg.norm(side))
@@ -101,12 +116,12 @@ def _edge_points(grey: Image, start: Array, end: Array) -> Array | None:
     count = int(min(max(length / 1.5, 8.0), 60.0))
     base = start + np.linspace(_FROM, _TO, count)[:, None] * side
     offset = np.arange(-reach, reach + 0.5 * _STEP_PX, _STEP_PX)
-    where = base[:, None, :] + offset[:, None] * outward
+    where = base[:, None, :] + offset[:, None] * outward - origin
     low, high = where.min(axis=(0, 1)), where.max(axis=(0, 1))
-    if low.min() < 0.0 or high[0] > grey.shape[1] - 1 or high[1] > grey.shape[0] - 1:
+    if low.min() < 0.0 or high[0] > light.shape[1] - 1 or high[1] > light.shape[0] - 1:
         return None
     at = where.astype(np.float32)
-    profile = cv2.remap(grey, at[:, :, 0], at[:, :, 1], cv2.INTER_LINEAR)
+    profile = cv2.remap(light, at[:, :, 0], at[:, :, 1], cv2.INTER_LINEAR)
     slope = np.diff(np.asarray(profile, dtype=np.float64), axis=1)
     middle = 0.5 * (offset[1:] + offset[:-1])
     # Against the noise: only what rises by a good part of the steepest rise belongs to the edge.

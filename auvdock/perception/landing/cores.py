@@ -1,0 +1,153 @@
+"""The detector of near lights: cores, found from the brightest level downwards.
+
+A light a few metres off is a saturated disc in a halo that is wider than the gap to its neighbour. Its core stands out
+all the same, in the mean of the colour channels, of which the lamp's own saturates long before the others: cut just
+below the peak, every light is a component of its own. The cuts then go down; a component that holds no light found
+above is a further, dimmer one. The lights of a landing station are equals, so what
+is much dimmer than the brightest is none of them: a lit tag, a glint, the platform's edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from auvdock.core.arrays import Array, Image, IntArray
+from auvdock.core.contracts import BLUE, RED, Detections, Frame, RegionOfInterest
+from auvdock.core.errors import ConfigError
+from auvdock.perception.spots import inside, noise_sigma
+
+__all__ = ["CoreCfg", "CoreDetector"]
+
+_SCORE_HALF_SNR = 10.0
+_HALO_PX = 12
+_BORDER_PX = 4
+
+
+@dataclass(frozen=True)
+class CoreCfg:
+    """Settings of the core detector; ours."""
+
+    levels: tuple[float, ...] = (0.97, 0.92, 0.86, 0.79, 0.71, 0.62, 0.53)
+    """Cuts, as shares of the brightest code above the median; the last is how dim a light may be beside the
+    brightest."""
+    prominence: float = 0.06
+    """How far a light's peak stands above the cut at which it comes off its neighbours, as the same share."""
+    min_contrast: float = 12.0
+    """An image whose brightest code is less above its median holds no light, nor one less than eight σ of the noise."""
+    min_area_px: int = 1
+    """Smaller components, at half the resolution, are noise."""
+    max_aspect: float = 1.8
+    """A component longer than this times its width is two lights grown together, or none."""
+    max_lights: int = 16
+    """Only the brightest components are kept."""
+
+    def __post_init__(self) -> None:
+        """Refuse cuts without meaning."""
+        falling = all(a > b for a, b in zip(self.levels, self.levels[1:], strict=False))
+        if not self.levels or not falling or not 0.0 < self.levels[-1] or not self.levels[0] < 1.0:
+            raise ConfigError("detector.levels", self.levels, "falling shares between 0 and 1")
+        if not 0.0 < self.prominence < 1.0:
+            raise ConfigError("detector.prominence", self.prominence, "a share between 0 and 1")
+        for name in ("min_contrast", "max_aspect"):
+            if not getattr(self, name) >= 1.0:
+                raise ConfigError(f"detector.{name}", getattr(self, name), "1 or more")
+        for name in ("min_area_px", "max_lights"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"detector.{name}", getattr(self, name), "1 or more")
+
+
+class CoreDetector:
+    """Finds the cores of near lights."""
+
+    def __init__(self, cfg: CoreCfg | None = None) -> None:
+        """Keep the settings."""
+        self._cfg = cfg or CoreCfg()
+
+    def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> Detections:
+        """Detect in the whole frame; of that, only what lies in the given regions when there are any.
+
+        A light's centre is the centroid, weighted by brightness, of its core and of what little of the halo closes
+        around it; its box is that of the core at the cut at which it was found. Cores cut off by the image's edge have
+        no centre and are left out. Score = s / (s + 10) with s the peak above the median over the noise.
+        """
+        found = self._detect(frame.image)
+        return inside(found, regions) if regions else found
+
+    def _detect(self, image: Image) -> Detections:
+        cfg = self._cfg
+        level = _mean_channel(image)
+        small = np.asarray(cv2.resize(level, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        base, peak = float(np.median(small[::2, ::2])), float(small.max())
+        sigma = noise_sigma(level)
+        if peak - base < max(cfg.min_contrast, 8.0 * sigma):
+            return Detections.empty()
+        taken = np.zeros(small.shape, dtype=np.uint8)
+        boxes: list[Array] = []
+        centres: list[Array] = []
+        peaks: list[float] = []
+        for share in cfg.levels:
+            cut = base + share * (peak - base)
+            _, mask = cv2.threshold(small, cut, 255, cv2.THRESH_BINARY)
+            count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_16U)
+            old = set(np.unique(labels[taken > 0]).tolist())
+            for label in range(1, count):
+                x, y, w, h, area = stats[label].tolist()
+                if label in old or area < cfg.min_area_px:
+                    continue
+                part = labels[y : y + h, x : x + w] == label
+                top = float(small[y : y + h, x : x + w][part].max())
+                if share < cfg.levels[0] and top - cut < cfg.prominence * (peak - base):
+                    continue
+                taken[y : y + h, x : x + w][part] = 1
+                cut_off = x == 0 or y == 0 or x + w == small.shape[1] or y + h == small.shape[0]
+                if cut_off or max(w, h) > cfg.max_aspect * min(w, h) + 2.0:
+                    continue
+                box = np.array([x, y, x + w, y + h]) * 2
+                centres.append(_centre(level, box, cut))
+                boxes.append(box - 0.5)
+                peaks.append(top - base)
+            if len(peaks) >= cfg.max_lights:
+                break
+        return _detections(image, boxes, centres, np.array(peaks) / sigma, cfg.max_lights)
+
+
+def _mean_channel(image: Image) -> Image:
+    """(H, W) mean over the channels, lightly smoothed against pixel noise."""
+    mean = cv2.transform(image, np.full((1, 3), 1.0 / 3.0))
+    return np.asarray(cv2.GaussianBlur(mean, (3, 3), 0.8), dtype=np.uint8)
+
+
+def _centre(level: Image, box: IntArray, cut: float) -> Array:
+    """(2,) centroid of what closes within a box and a border of a few pixels, or at least of what is above the cut."""
+    x0, y0 = np.maximum(box[:2] - _BORDER_PX, 0).tolist()
+    patch = level[y0 : box[3] + _BORDER_PX, x0 : box[2] + _BORDER_PX].astype(np.float64)
+    rim = max(patch[0].max(), patch[-1].max(), patch[:, 0].max(), patch[:, -1].max())
+    weight = np.maximum(patch - min(float(rim), cut), 0.0)
+    total = float(weight.sum())
+    column = float(weight.sum(axis=0) @ np.arange(weight.shape[1])) / total
+    row = float(weight.sum(axis=1) @ np.arange(weight.shape[0])) / total
+    return np.array([x0 + column, y0 + row])
+
+
+def _class(patch: Image, ground: Array) -> int:
+    """Whether there is more red or more blue in a patch than in the image as a whole."""
+    red, _, blue, _ = cv2.mean(patch)
+    return RED if red - ground[0] > blue - ground[2] else BLUE
+
+
+def _detections(image: Image, boxes: list[Array], centres: list[Array], snr: Array, most: int) -> Detections:
+    if not boxes:
+        return Detections.empty()
+    order: IntArray = np.argsort(-snr, kind="stable")[:most]
+    xyxy = np.array(boxes)[order]
+    # A core is white; the colour is in the halo around it.
+    rim = (xyxy[:, 2:] - xyxy[:, :2]).max(axis=1, keepdims=True) + _HALO_PX
+    around = np.maximum(np.hstack([xyxy[:, :2] - rim, xyxy[:, 2:] + rim]).round().astype(int), 0)
+    ground = np.median(image[::8, ::8].reshape(-1, 3), axis=0).astype(np.float64)
+    classes = np.array([_class(image[y0:y1, x0:x1], ground) for x0, y0, x1, y1 in around.tolist()], dtype=np.int64)
+    strength = snr[order]
+    return Detections(xyxy, np.array(centres)[order], strength / (strength + _SCORE_HALF_SNR), classes)
