@@ -84,7 +84,7 @@ from auvdock.core.transforms import euler_zyx_from_rotation, invert
 from auvdock.envs.chase import ChaseCamera
 from auvdock.envs.config import WorldCfg
 from auvdock.envs.world import DockingWorld, Sensed
-from auvdock.perception.detectors import make_detector
+from auvdock.perception.detectors import make_station_detector
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
 from auvdock.sim.truth import Truth
 
@@ -131,8 +131,10 @@ class DockingEnv(gymnasium.Env[Any, Any]):
         self._render_camera = render_camera
         self._perception_cfg = perception or PerceptionCfg()
         self._world = DockingWorld(self.cfg, self._perception_cfg.detector)
-        self._detector = make_detector(self._perception_cfg.detector)
-        self._perception = BeaconPerception(self._perception_cfg, self._world.camera, self.cfg.station.layout)
+        self._detector = make_station_detector(self._perception_cfg.detector, self.cfg.station)
+        self._perception = BeaconPerception(
+            self._perception_cfg, self._world.camera, self.cfg.station.layout, self.cfg.station.rotating
+        )
         self._chase = ChaseCamera(self._world.simulator)
         self._percept: Percept | None = None
         self._fix: AzimuthFix | None = None

@@ -14,7 +14,7 @@ from auvdock.episode.config import EpisodeCfg
 from auvdock.episode.metrics import GuidanceMetrics
 from auvdock.episode.rotating_metrics import RotatingMetrics
 from auvdock.episode.trace import Tick
-from auvdock.perception.detectors import make_detector
+from auvdock.perception.detectors import make_station_detector
 from auvdock.perception.pipeline import BeaconPerception
 from auvdock.sim.truth import Truth
 
@@ -38,9 +38,11 @@ class ConicalTask:
         self._cfg = cfg
         self.station = cfg.world.station
         self.detector = cfg.perception.detector
-        self._detector = make_detector(self.detector)
+        self._detector = make_station_detector(self.detector, self.station)
         self.world = DockingWorld(cfg.world, self.detector)
-        self._perception = BeaconPerception(cfg.perception, self.world.camera, self.station.layout)
+        self._perception = BeaconPerception(
+            cfg.perception, self.world.camera, self.station.layout, self.station.rotating
+        )
         self.pilot = make_pilot(cfg, self.world)
 
     def reset(self) -> None:

@@ -35,8 +35,21 @@ class Association(Protocol):
         """Forget everything."""
         ...
 
-    def update(self, tracks: LightTracker, detections: Detections, rotation_prior: Array) -> Associated:
-        """Process one frame; writes `tracks.beacon_id`."""
+    def update(
+        self,
+        tracks: LightTracker,
+        detections: Detections,
+        rotation_prior: Array,
+        heading_sigma_rad: float | None = None,
+    ) -> Associated:
+        """Process one frame; writes `tracks.beacon_id`.
+
+        Args:
+            tracks: the lights, updated with this frame.
+            detections: the frame's.
+            rotation_prior: (3, 3) R_camera_station of the vehicle's own attitude.
+            heading_sigma_rad: standard deviation of the station's heading in it, None where it was surveyed.
+        """
         ...
 
 

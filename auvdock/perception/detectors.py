@@ -9,11 +9,12 @@ from typing import Any, TypeVar, cast
 
 from auvdock.core.contracts import Detector
 from auvdock.core.errors import ConfigError
+from auvdock.core.station import ConicalStationCfg
 from auvdock.perception.blob import BlobCfg, BlobDetector
 from auvdock.perception.landing.cores import CoreCfg, CoreDetector
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
-__all__ = ["DETECTORS", "make_detector"]
+__all__ = ["DETECTORS", "make_detector", "make_station_detector"]
 
 DETECTORS = ("threshold", "blob", "cores")
 """Names of the package's own detectors; anything with a colon is looked up as "package.module:Name"."""
@@ -38,6 +39,17 @@ def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
     if ":" not in name:
         raise ConfigError("detector", name, f"one of {', '.join(DETECTORS)}, or your own as package.module:Name")
     return _foreign(name, settings)
+
+
+def make_station_detector(name: str, station: ConicalStationCfg) -> Detector:
+    """The detector `name` for a station: where that carries a rotating beacon, the package's own measure flux as well.
+
+    Raises:
+        ConfigError: as `make_detector`.
+    """
+    if station.rotating is not None and name in DETECTORS:
+        return make_detector(name, flux=True)
+    return make_detector(name)
 
 
 _T = TypeVar("_T")

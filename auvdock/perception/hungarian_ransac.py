@@ -73,8 +73,15 @@ class HungarianRansacAssociation:
         self._pixels: Array = np.zeros((0, 2))
         self._held: Associated | None = None
 
-    def update(self, tracks: LightTracker, detections: Detections, rotation_prior: Array) -> Associated:
+    def update(
+        self,
+        tracks: LightTracker,
+        detections: Detections,
+        rotation_prior: Array,
+        heading_sigma_rad: float | None = None,
+    ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`."""
+        self._solver.heading_sigma_rad = heading_sigma_rad
         tracks.beacon_id[:] = -1
         blue = np.flatnonzero(detections.class_id == BLUE)
         ids, chosen = self._carry(detections, blue)

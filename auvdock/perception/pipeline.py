@@ -9,17 +9,22 @@ from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Detections, Percept, Proprioception
 from auvdock.core.errors import ConfigError
+from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.perception.association import Association
 from auvdock.perception.authentication import AuthenticationCfg
 from auvdock.perception.hungarian_ransac import HungarianRansacAssociation, HungarianRansacCfg
 from auvdock.perception.line_of_sight import LineOfSight, LineOfSightCfg
 from auvdock.perception.pnp import PnpCfg
-from auvdock.perception.prior import AttitudePrior
+from auvdock.perception.prior import AttitudePrior, FacingHeading
+from auvdock.perception.rotating.config import ForwardBeaconCfg
+from auvdock.perception.rotating.forward_beacon import ForwardBeacon
 from auvdock.perception.spatiotemporal import SpatiotemporalAssociation
 from auvdock.perception.tracker import LightTracker, TrackerCfg
 
 __all__ = ["ASSOCIATIONS", "BeaconPerception", "PerceptionCfg"]
 
+_LEAST_SIGMA_RAD = math.radians(1.0)
+"""What compass and clock leave of the station's heading at best (ours)."""
 ASSOCIATIONS = ("spatiotemporal", "hungarian_ransac")
 """Ways to tell which light is which beacon."""
 
@@ -44,6 +49,8 @@ class PerceptionCfg:
     """The comparison's settings."""
     line_of_sight: LineOfSightCfg = LineOfSightCfg()
     """Bearings without a pose."""
+    rotating: ForwardBeaconCfg = ForwardBeaconCfg()
+    """The rotating beacon, where the station has one."""
 
     def __post_init__(self) -> None:
         """Check the association's name; the detector's is checked when it is made."""
@@ -58,10 +65,33 @@ class PerceptionCfg:
 
 
 class BeaconPerception:
-    """Tracks, identities, pose and bearings of one station's lights in one camera."""
+    """Tracks, identities, pose and bearings of one station's lights in one camera.
 
-    def __init__(self, cfg: PerceptionCfg, camera: Camera, layout: BeaconLayout) -> None:
-        """Build the parts for one camera and one station."""
+    Detections of the rotating beacon, once it is known, are kept from the tracks: it is blue and bright and would be
+    taken for a lamp of the array, or for the far one.
+    """
+
+    def __init__(
+        self,
+        cfg: PerceptionCfg,
+        camera: Camera,
+        layout: BeaconLayout,
+        rotating: RotatingBeaconCfg | None = None,
+        heading_surveyed: bool = True,
+    ) -> None:
+        """Build the parts for one camera and one station.
+
+        Args:
+            cfg: settings.
+            camera: the camera.
+            layout: the station's fixed lights.
+            rotating: its rotating beacon, if it has one.
+            heading_surveyed: the station's heading by the vehicle's compass is `cfg.station_yaw_deg`; else it comes
+                from the rotating beacon, and before that from the lamps themselves, which shine to the front only.
+        """
+        self._forward = ForwardBeacon(cfg.rotating, camera, rotating) if rotating is not None else None
+        self._surveyed = heading_surveyed
+        self._facing = FacingHeading(camera)
         self._tracks = LightTracker(cfg.tracker, camera.rate_hz, camera.width_px, camera.height_px)
         self._prior = AttitudePrior(camera, math.radians(cfg.station_yaw_deg))
         sigma = cfg.tracker.pixel_sigma_px
@@ -77,13 +107,27 @@ class BeaconPerception:
         self._tracks.reset()
         self._association.reset()
         self._line_of_sight.reset()
+        self._facing.reset()
+        if self._forward is not None:
+            self._forward.reset()
 
     def update(self, detections: Detections, proprioception: Proprioception) -> Percept:
         """Process one frame's detections with the vehicle's own sensors of the same instant."""
         tracks = self._tracks
-        tracks.update(detections)
-        associated = self._association.update(tracks, detections, self._prior.rotation(proprioception))
+        azimuth, fixed = None, detections
+        if self._forward is not None:
+            azimuth = self._forward.update(detections, proprioception)
+            if self._forward.mask.any():
+                fixed = detections.select(~self._forward.mask)
+        tracks.update(fixed)
+        if self._surveyed:
+            associated = self._association.update(tracks, fixed, self._prior.rotation(proprioception))
+        else:
+            heading, sigma = self._heading(proprioception)
+            prior = self._prior.rotation(proprioception, heading)
+            associated = self._association.update(tracks, fixed, prior, sigma)
         long_range, entrance = self._line_of_sight.update(tracks, associated.solution)
+        self._facing.note(long_range)
         return Percept(
             time_s=proprioception.time_s,
             pose=associated.pose,
@@ -92,4 +136,12 @@ class BeaconPerception:
             array_count=associated.array_count,
             detections=detections,
             tracks=tracks.views(),
+            azimuth=azimuth,
         )
+
+    def _heading(self, proprioception: Proprioception) -> tuple[float, float]:
+        """Heading of the station's approach axis by the vehicle's compass and its standard deviation, both in rad."""
+        estimate = self._forward.estimate if self._forward is not None else None
+        if estimate is None:
+            return self._facing.heading(proprioception)
+        return estimate.axis_yaw_rad, max(estimate.sigma_axis_rad, _LEAST_SIGMA_RAD)

@@ -108,6 +108,9 @@ class PnpSolution:
         return 0.5 * (covariance + covariance.T)
 
 
+_EYE_3 = np.eye(3)
+
+
 class PnpSolver:
     """Solves poses for one camera."""
 
@@ -120,6 +123,8 @@ class PnpSolver:
         self._attitude_weight = 1.0 / math.radians(cfg.attitude_sigma_deg) ** 2
         prior = math.radians(cfg.attitude_prior_sigma_deg)
         self._prior_weight = 1.0 / prior**2 if prior > 0.0 else 0.0
+        self.heading_sigma_rad: float | None = None
+        """Standard deviation of the prior's turn about the station's upright axis, where it is worse than the rest."""
         self._max_attitude_rad = math.radians(cfg.max_attitude_error_deg)
         self._ambiguous_rad = math.radians(2.0 * cfg.attitude_sigma_deg)
 
@@ -264,6 +269,12 @@ class PnpSolver:
     def _prior_terms(self, prior: Array) -> tuple[Array, Array]:
         """Rotation vector r of the prior and w J_lᵀ J_l = w [A I + (1 − A) r̂ r̂ᵀ], A = 2 (1 − cos |r|) / |r|²."""
         vector = _rodrigues(prior).ravel()
+        if self.heading_sigma_rad is not None:
+            up = prior[:, 2]
+            heading_weight = min(1.0 / self.heading_sigma_rad**2, self._prior_weight)
+            weights = self._prior_weight * _EYE_3 + (heading_weight - self._prior_weight) * np.outer(up, up)
+            left = _left_jacobian(vector)
+            return vector, left.T @ weights @ left
         x, y, z = vector.tolist()
         square = x * x + y * y + z * z
         if square < 1e-16:

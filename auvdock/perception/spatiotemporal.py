@@ -65,8 +65,15 @@ class SpatiotemporalAssociation:
         self._last: PnpSolution | None = None
         self._age = 0
 
-    def update(self, tracks: LightTracker, detections: Detections, rotation_prior: Array) -> Associated:
+    def update(
+        self,
+        tracks: LightTracker,
+        detections: Detections,
+        rotation_prior: Array,
+        heading_sigma_rad: float | None = None,
+    ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`."""
+        self._solver.heading_sigma_rad = heading_sigma_rad
         self._age += 1
         if self._age > _MAX_POSE_AGE:
             self._last = None
