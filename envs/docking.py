@@ -133,7 +133,11 @@ class DockingEnv(gymnasium.Env[Any, Any]):
         self._world = DockingWorld(self.cfg, self._perception_cfg.detector)
         self._detector = make_station_detector(self._perception_cfg.detector, self.cfg.station)
         self._perception = BeaconPerception(
-            self._perception_cfg, self._world.camera, self.cfg.station.layout, self.cfg.station.rotating
+            self._perception_cfg,
+            self._world.camera,
+            self.cfg.station.layout,
+            self.cfg.station.rotating,
+            heading_surveyed=self.cfg.station_heading == "surveyed",
         )
         self._chase = ChaseCamera(self._world.simulator)
         self._percept: Percept | None = None

@@ -41,7 +41,11 @@ class ConicalTask:
         self._detector = make_station_detector(self.detector, self.station)
         self.world = DockingWorld(cfg.world, self.detector)
         self._perception = BeaconPerception(
-            cfg.perception, self.world.camera, self.station.layout, self.station.rotating
+            cfg.perception,
+            self.world.camera,
+            self.station.layout,
+            self.station.rotating,
+            heading_surveyed=cfg.world.station_heading == "surveyed",
         )
         self.pilot = make_pilot(cfg, self.world)
 
