@@ -14,7 +14,7 @@ from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.sim.simulator import SimCfg
 
-__all__ = ["FIDELITIES", "HEADINGS", "LimitsCfg", "StartCfg", "WorldCfg", "rotating_world_cfg"]
+__all__ = ["FIDELITIES", "HEADINGS", "LimitsCfg", "StartCfg", "WorldCfg", "check_rates", "rotating_world_cfg"]
 
 FIDELITIES = ("pixels", "beacons")
 """`pixels` renders every frame; `beacons` draws detections from the same radiometry without an image."""
@@ -113,10 +113,19 @@ class WorldCfg:
             raise ConfigError("world.frame_drop_share", self.frame_drop_share, "a share of 0 to 0.95")
         if self.fidelity not in FIDELITIES:
             raise ConfigError("fidelity", self.fidelity, f"one of {', '.join(FIDELITIES)}")
-        for name, rate in (("world.control_hz", self.control_hz), ("world.camera.rate_hz", self.camera.rate_hz)):
-            steps = self.sim.physics_hz / rate if rate > 0.0 else 0.0
-            if steps < 1.0 or abs(steps - round(steps)) > 1e-9:
-                raise ConfigError(name, rate, f"a rate that divides the physics rate of {self.sim.physics_hz:g} Hz")
+        check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
+
+
+def check_rates(physics_hz: float, control_hz: float, camera_hz: float) -> None:
+    """Refuse rates of control and camera that do not divide the physics rate.
+
+    Raises:
+        ConfigError: one that does not.
+    """
+    for name, rate in (("world.control_hz", control_hz), ("world.camera.rate_hz", camera_hz)):
+        steps = physics_hz / rate if rate > 0.0 else 0.0
+        if steps < 1.0 or abs(steps - round(steps)) > 1e-9:
+            raise ConfigError(name, rate, f"a rate that divides the physics rate of {physics_hz:g} Hz")
 
 
 def rotating_world_cfg() -> WorldCfg:

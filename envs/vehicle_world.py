@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -17,7 +18,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.marine import flip_vector
 from auvdock.core.stations import StationCfg
 from auvdock.core.strict import load_toml
-from auvdock.core.vehicle import MountCfg
+from auvdock.core.vehicle import MountCfg, VehicleCfg
 from auvdock.envs.config import LimitsCfg
 from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
 from auvdock.optics.water import load_water, with_attenuation
@@ -81,11 +82,6 @@ class WorldSettings(Protocol):
         ...
 
     @property
-    def camera(self) -> CameraCfg:
-        """The camera that the pilot looks through."""
-        ...
-
-    @property
     def limits(self) -> LimitsCfg:
         """What ends an episode without success."""
         ...
@@ -109,26 +105,25 @@ class VehicleWorld(ABC):
         water: the water.
     """
 
-    def __init__(self, cfg: WorldSettings, station: StationCfg, mount: str) -> None:
+    def __init__(self, cfg: WorldSettings, station: StationCfg, make_camera: Callable[[VehicleCfg], Camera]) -> None:
         """Build simulator, camera and water.
 
         Args:
             cfg: the world.
             station: its station.
-            mount: "bow" or "belly", the place of the pilot's camera.
+            make_camera: makes the camera that the pilot looks through, where the vehicle's data puts it.
 
         Raises:
             ConfigError: a preset that does not exist or a value that does not fit.
         """
         self.simulator = Simulator(cfg.sim, station)
-        vehicle = self.simulator.vehicle
-        self.camera = mounted_camera(cfg.camera, vehicle.bow_camera if mount == "bow" else vehicle.belly_camera)
+        self.camera = make_camera(self.simulator.vehicle)
         self.water = load_water(cfg.water)
         if cfg.attenuation_per_m is not None:
             self.water = with_attenuation(self.water, cfg.attenuation_per_m)
         self._limits, self._hold_s, self._control_s = cfg.limits, station.latch.hold_s, 1.0 / cfg.control_hz
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)
-        self._steps_per_frame = round(cfg.sim.physics_hz / cfg.camera.rate_hz)
+        self._steps_per_frame = round(cfg.sim.physics_hz / self.camera.rate_hz)
         self._step_count = 0
         self._last_frame_step = -1
         self._latched_at_s: float | None = None

@@ -12,7 +12,7 @@ from auvdock.core.beacons import BeaconLayout
 from auvdock.core.contracts import Proprioception
 from auvdock.core.transforms import quat_wxyz_from_euler_zyx
 from auvdock.envs.config import StartCfg, WorldCfg
-from auvdock.envs.vehicle_world import Sensed, Start, VehicleWorld, detection_model
+from auvdock.envs.vehicle_world import Sensed, Start, VehicleWorld, detection_model, mounted_camera
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.sensing import BeaconSensor
 from auvdock.optics.station_clock import StationClock
@@ -50,7 +50,7 @@ class DockingWorld(VehicleWorld):
         Raises:
             ConfigError: a preset that does not exist or a value that does not fit.
         """
-        super().__init__(cfg, cfg.station, "bow")
+        super().__init__(cfg, cfg.station, lambda vehicle: mounted_camera(cfg.camera, vehicle.bow_camera))
         self.cfg = cfg
         self._clock: StationClock | None = None
         self._loss_rng = np.random.default_rng(0)

@@ -7,13 +7,24 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from auvdock.assets import asset
+from auvdock.controllers.landing.config import LandingControlCfg
 from auvdock.controllers.pilot import ControlCfg
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import merge, read_toml
 from auvdock.envs.config import WorldCfg, rotating_world_cfg
+from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.perception.landing.config import LandingPerceptionCfg
 from auvdock.perception.pipeline import PerceptionCfg
 
-__all__ = ["LEVELS", "LEVEL_STATIONS", "AnyEpisodeCfg", "EpisodeCfg", "level_cfg"]
+__all__ = [
+    "LEVELS",
+    "LEVEL_STATIONS",
+    "AnyEpisodeCfg",
+    "EpisodeCfg",
+    "LandingEpisodeCfg",
+    "landing_level_cfg",
+    "level_cfg",
+]
 
 LEVELS = (0, 1, 2, 3, 4)
 """Difficulty levels; `assets/levels/level_N.toml` (rotating beacon: `rotating_N.toml`) says what each changes."""
@@ -38,7 +49,24 @@ class EpisodeCfg:
         return merge(self, changes)
 
 
-AnyEpisodeCfg: TypeAlias = EpisodeCfg
+@dataclass(frozen=True)
+class LandingEpisodeCfg:
+    """One landing episode."""
+
+    world: LandingWorldCfg = LandingWorldCfg()
+    perception: LandingPerceptionCfg = LandingPerceptionCfg()
+    control: LandingControlCfg = LandingControlCfg()
+
+    def override(self, changes: Mapping[str, Any]) -> LandingEpisodeCfg:
+        """A copy with nested fields replaced, checked as strictly as a TOML file.
+
+        Raises:
+            ConfigError: an unknown key or a value that does not fit.
+        """
+        return merge(self, changes)
+
+
+AnyEpisodeCfg: TypeAlias = EpisodeCfg | LandingEpisodeCfg
 """Configuration of an episode of any kind of docking."""
 
 
@@ -52,10 +80,23 @@ def level_cfg(level: int, station: str = "conical") -> EpisodeCfg:
     Raises:
         ConfigError: no such level or station.
     """
+    if station == "conical":
+        return EpisodeCfg().override(_level_changes("level", level))
+    if station == "rotating":
+        return EpisodeCfg(world=rotating_world_cfg()).override(_level_changes("rotating", level))
+    raise ConfigError("station", station, f"one of {', '.join(LEVEL_STATIONS)}")
+
+
+def landing_level_cfg(level: int) -> LandingEpisodeCfg:
+    """The configuration of a difficulty level of landing; `assets/levels/landing_N.toml` says what each changes.
+
+    Raises:
+        ConfigError: no such level.
+    """
+    return LandingEpisodeCfg().override(_level_changes("landing", level))
+
+
+def _level_changes(kind: str, level: int) -> dict[str, Any]:
     if level not in LEVELS:
         raise ConfigError("level", level, f"one of {', '.join(map(str, LEVELS))}")
-    if station == "conical":
-        return EpisodeCfg().override(read_toml(asset("levels", f"level_{level}")))
-    if station == "rotating":
-        return EpisodeCfg(world=rotating_world_cfg()).override(read_toml(asset("levels", f"rotating_{level}")))
-    raise ConfigError("station", station, f"one of {', '.join(LEVEL_STATIONS)}")
+    return read_toml(asset("levels", f"{kind}_{level}"))

@@ -40,17 +40,20 @@ class EpisodeResult:
     """Outcome and metrics of one episode; NaN never appears, None stands for "did not happen"."""
 
     success: bool
-    """The latch has closed and held, within the entry limits (`auvdock.core.station.LatchCfg`)."""
+    """The latch has closed and held, within the entry limits (`auvdock.core.station.LatchCfg`); in landing, after a
+    touchdown within those of `auvdock.core.landing_station.LandingLatchCfg`."""
     failure_reason: str | None
     """One of `FAILURE_REASONS`, None on success."""
     distortion_rate: float | None
     """invalid_frames / precise_frames (paper A, table 10); None if precise guidance was never entered."""
     precise_frames: int
-    """Frames in precise guidance: from the first measured pose until the array leaves the camera's view near by."""
+    """Frames in precise guidance: from the first measured pose until the array leaves the camera's view near by; in
+    landing, until the latch closes."""
     invalid_frames: int
     """Those of them without a pose measured in that frame."""
     entry_distance_m: float | None
-    """Distance from the mouth along the approach axis at the first measured pose (paper A, table 9)."""
+    """Distance from the mouth along the approach axis at the first measured pose (paper A, table 9); in landing, of
+    the seat from its place."""
     precise_range_m: float | None
     """From there to the last measured pose: total range of precise guidance (paper A, table 9)."""
     time_s: float
@@ -91,6 +94,36 @@ class EpisodeResult:
     """Rotating beacon: their root mean square error."""
     handover_azimuth_error_rad: float | None = None
     """Rotating beacon: error of the believed azimuth when the array's or the far lamp's light took over."""
+    touchdown_speed_m_s: float | None = None
+    """Landing, with all down to `blind_share`: downward speed at the first contact with the station."""
+    touchdown_force_n: float | None = None
+    """Greatest force of the station on the vehicle from that contact until the latch closed."""
+    final_position_error_m: float | None = None
+    """Horizontal distance of the seat from its place as the latch closed, or at the end of the last descent."""
+    max_position_error_m: float | None = None
+    """The greatest such distance after alignment (`auvdock.episode.landing_metrics`)."""
+    final_heading_error_rad: float | None = None
+    """Magnitude of the heading error ψ at the same moment as the final position error."""
+    max_heading_error_rad: float | None = None
+    """The greatest after alignment."""
+    aligned_frames: int | None = None
+    """Frames with a pose after alignment; the following figures are over them."""
+    estimate_position_p95_m: float | None = None
+    """95th percentile of the estimated less the true position, the greatest of its three components."""
+    estimate_heading_p95_rad: float | None = None
+    """95th percentile of the magnitude of the estimated less the true heading."""
+    estimate_within_20mm_3deg: float | None = None
+    """Share within ±20 mm in each component and 3° of heading (paper C's bounds)."""
+    estimate_within_10mm_1deg: float | None = None
+    """Share within ±10 mm and 1°."""
+    lights_share: float | None = None
+    """Share of the frames since the first measured pose that rested on the lights alone."""
+    tag_share: float | None = None
+    """On the tag alone."""
+    fused_share: float | None = None
+    """On both."""
+    blind_share: float | None = None
+    """On neither."""
 
     WALL_CLOCK_FIELDS = ("wall_s", "real_time_factor")
 

@@ -9,8 +9,9 @@ from auvdock.controllers.pilot import Pilot
 from auvdock.core.contracts import Percept
 from auvdock.core.stations import StationCfg
 from auvdock.envs.vehicle_world import Sensed, VehicleWorld
-from auvdock.episode.config import AnyEpisodeCfg
+from auvdock.episode.config import AnyEpisodeCfg, LandingEpisodeCfg
 from auvdock.episode.conical_task import ConicalTask
+from auvdock.episode.landing_task import LandingTask
 from auvdock.episode.trace import Tick
 from auvdock.sim.truth import Truth
 
@@ -80,4 +81,6 @@ def make_task(cfg: AnyEpisodeCfg) -> Task:
     Raises:
         ConfigError: a name that does not exist or a value that does not fit.
     """
+    if isinstance(cfg, LandingEpisodeCfg):
+        return LandingTask(cfg)
     return ConicalTask(cfg)

@@ -38,7 +38,7 @@ def thrust_down(sim: Simulator, force_n: float) -> Array:
     """The command of least norm for a downward force."""
     thrusters = [actuator.kind == "thruster" for actuator in sim.vehicle.actuators]
     wrenches = sim.vehicle.thruster_wrenches_body * np.array(thrusters)
-    return np.linalg.pinv(wrenches) @ np.array([0.0, 0.0, -force_n, 0.0, 0.0, 0.0])
+    return np.asarray(np.linalg.pinv(wrenches) @ np.array([0.0, 0.0, -force_n, 0.0, 0.0, 0.0]), dtype=np.float64)
 
 
 def descend(sim: Simulator, force_n: float, seconds: float) -> bool:

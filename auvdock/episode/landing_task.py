@@ -1,0 +1,73 @@
+"""Landing on the platform."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from auvdock.controllers.landing.pilot import LandingPilot
+from auvdock.controllers.pilot import Pilot
+from auvdock.core.contracts import Percept
+from auvdock.envs.landing_world import LandingWorld
+from auvdock.envs.vehicle_world import Sensed
+from auvdock.episode.config import LandingEpisodeCfg
+from auvdock.episode.landing_metrics import LandingMetrics
+from auvdock.perception.detectors import make_detector
+from auvdock.perception.landing.pipeline import LandingPerception
+from auvdock.perception.landing.tag_detectors import make_tag_detector
+
+__all__ = ["LandingTask"]
+
+_STAGES = {
+    "search": "search",
+    "approach": "far",
+    "align": "mid",
+    "descend": "near",
+    "touchdown": "terminal",
+    "docked": "terminal",
+    "abort": "timeout",
+}
+"""Failure reasons by guidance mode."""
+
+
+class LandingTask:
+    """Implements `auvdock.episode.task.Task` for `LandingEpisodeCfg`."""
+
+    name = "landing station"
+
+    def __init__(self, cfg: LandingEpisodeCfg) -> None:
+        """Build world, detectors, perception and pilot.
+
+        Raises:
+            ConfigError: a name that does not exist or a value that does not fit.
+        """
+        self.station = cfg.world.station
+        self.detector = cfg.perception.detector
+        self._detector = make_detector(self.detector)
+        self._tag_detector = make_tag_detector(cfg.perception.tag_detector)
+        self.world = LandingWorld(cfg.world, self.detector, cfg.perception.tag_detector)
+        vehicle, camera = self.world.simulator.vehicle, self.world.camera
+        self._perception = LandingPerception(cfg.perception, camera, self.station)
+        self.pilot: Pilot[Any] = LandingPilot(cfg.control, vehicle, self.station, camera, 1.0 / cfg.world.control_hz)
+
+    def reset(self) -> None:
+        """Forget the pose and its filter."""
+        self._perception.reset()
+
+    def perceive(self, sensed: Sensed) -> Percept | None:
+        """Perception's answer to what was sensed; None if there was no new frame."""
+        own = sensed.proprioception
+        if sensed.frame is not None:
+            tags = self._tag_detector.detect(sensed.frame, self._perception.tag_regions(own))
+            return self._perception.update(self._detector.detect(sensed.frame), tags, own)
+        if sensed.detections is not None:
+            return self._perception.update(sensed.detections, sensed.tags, own)
+        return None
+
+    def metrics(self) -> LandingMetrics:
+        """Metrics of a new episode."""
+        simulator = self.world.simulator
+        return LandingMetrics(self.world.camera, simulator.vehicle, simulator.T_world_station)
+
+    def stage(self, mode: str) -> str:
+        """The failure reason of an episode that ends in a guidance mode."""
+        return _STAGES.get(mode, mode)

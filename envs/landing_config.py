@@ -1,0 +1,88 @@
+"""Configuration of a landing world: platform, vehicle, water, belly camera with its lamps, and where it starts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from auvdock.core.calibrated_camera import CalibratedCameraCfg
+from auvdock.core.errors import ConfigError
+from auvdock.core.landing_station import LandingStationCfg, load_landing_station
+from auvdock.envs.config import FIDELITIES, LimitsCfg, check_rates
+from auvdock.optics.faults import FaultCfg
+from auvdock.optics.lamp import LampCfg
+from auvdock.optics.landing_camera import landing_imaging
+from auvdock.optics.nuisance import NuisanceCfg
+from auvdock.optics.settings import ImagingCfg
+from auvdock.sim.simulator import SimCfg
+
+__all__ = ["LandingStartCfg", "LandingWorldCfg"]
+
+
+@dataclass(frozen=True)
+class LandingStartCfg:
+    """Where a landing starts; each quantity is drawn uniformly."""
+
+    min_height_m: float = 3.0
+    """Least height of the seat above its place in the guides."""
+    max_height_m: float = 6.0
+    """Greatest such height."""
+    lateral_m: float = 1.5
+    """Greatest distance from the station's vertical, along and across the centre line each."""
+    heading_deg: float = 45.0
+    """Greatest heading difference to the centre line."""
+    random_current_direction: bool = True
+    """Draw the current's direction uniformly instead of taking sim.current.direction_deg."""
+
+    def __post_init__(self) -> None:
+        """Refuse impossible starts."""
+        if not 0.5 <= self.min_height_m <= self.max_height_m:
+            raise ConfigError("world.start.min_height_m", self.min_height_m, "0.5 m or more and at most max_height_m")
+        for name in ("max_height_m", "lateral_m", "heading_deg"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise ConfigError(f"world.start.{name}", getattr(self, name), "0 or more")
+
+
+@dataclass(frozen=True)
+class LandingWorldCfg:
+    """Everything outside the head of a vehicle that lands."""
+
+    fidelity: str = "pixels"
+    """"pixels" or "beacons"."""
+    water: str = "clear"
+    """Water preset: Jerlov "I" to "9C", "clear", "pool", "lake"."""
+    attenuation_per_m: float | None = None
+    """Beam attenuation c at 450 nm in 1/m in place of the preset's."""
+    detection_model: str | None = None
+    """TOML file of a fitted detection model of the lights for the beacons fidelity, in place of the detector's own."""
+    station: LandingStationCfg = field(default_factory=load_landing_station)
+    sim: SimCfg = SimCfg(vehicle="bluerov2_heavy")
+    camera: CalibratedCameraCfg = CalibratedCameraCfg()
+    """The belly camera; paper C's by default."""
+    imaging: ImagingCfg = field(default_factory=landing_imaging)
+    lamp: LampCfg | None = LampCfg()
+    """The vehicle's own lamps beside its belly camera."""
+    faults: FaultCfg = FaultCfg()
+    nuisance: NuisanceCfg = NuisanceCfg()
+    start: LandingStartCfg = LandingStartCfg()
+    limits: LimitsCfg = LimitsCfg()
+    control_hz: float = 20.0
+    """Commands a second; the paper's loop runs at 20 Hz, as its camera does. A multiple of the camera's rate."""
+
+    def __post_init__(self) -> None:
+        """Check that the rates divide and the names exist."""
+        if self.fidelity not in FIDELITIES:
+            raise ConfigError("fidelity", self.fidelity, f"one of {', '.join(FIDELITIES)}")
+        check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
+        periods = self.control_hz / self.camera.rate_hz
+        if abs(periods - round(periods)) > 1e-9:
+            raise ConfigError(
+                "world.control_hz", self.control_hz, f"a multiple of the camera's {self.camera.rate_hz:g} Hz"
+            )
+        highest_m = self.start.max_height_m + self.station.guide.seat_height_m
+        if highest_m > self.station.depth_m - 1.0:
+            raise ConfigError(
+                "world.start.max_height_m",
+                self.start.max_height_m,
+                f"a start below the surface, the station lies {self.station.depth_m:g} m deep",
+            )
