@@ -1,4 +1,4 @@
-"""The landing station's active latch: an arm that closes over a vehicle which lies in the guides and is slow."""
+"""The landing station's active latch: an arm that closes over a vehicle which has touched the guides and is slow."""
 
 from __future__ import annotations
 
@@ -69,7 +69,8 @@ class LandingLatch:
         cfg = self._cfg
         along, across, up = posture.seat_error_m
         return (
-            abs(along) <= cfg.along_m
+            self.touchdown_time_s is not None
+            and abs(along) <= cfg.along_m
             and abs(across) <= cfg.across_m
             and abs(up) <= cfg.height_m
             and abs(posture.heading_rad) <= self._max_heading_rad
@@ -79,4 +80,4 @@ class LandingLatch:
 
     def _touched_gently(self) -> bool:
         speed = self.touchdown_speed_m_s
-        return speed is None or speed <= self._cfg.max_touchdown_m_s
+        return speed is not None and speed <= self._cfg.max_touchdown_m_s
