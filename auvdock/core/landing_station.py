@@ -75,8 +75,8 @@ class LandingLatchCfg:
     """When the active latch closes on the platform, and with that what "docked" means for a landing.
 
     A touch of the guides wakes the arm. It reaches the vehicle when its seat (the centre of the round that rests in the
-    guides) is within the following of its place, and the vehicle is slow; it then pulls it tight. An episode is a success if the latch has
-    closed and held for `hold_s`, and the touchdown was no faster than `max_touchdown_m_s`.
+    guides) is within the following of its place, and the vehicle is slow; it then pulls it tight. An episode is a
+    success if the latch has closed and held for `hold_s`, and the touchdown was no faster than `max_touchdown_m_s`.
     """
 
     along_m: float = 0.06
