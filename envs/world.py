@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import cached_property
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class DockingWorld(VehicleWorld):
         self.cfg = cfg
         self._clock: StationClock | None = None
         self._loss_rng = np.random.default_rng(0)
-        optics = (
+        self._optics = (
             self.camera,
             self.water,
             BeaconLayout(cfg.station.layout.beacons + cfg.extra_lights),
@@ -62,11 +63,15 @@ class DockingWorld(VehicleWorld):
             cfg.imaging,
             self.simulator.T_world_station,
         )
-        self.imager = UnderwaterCamera(*optics, scene=self.simulator, rotating=cfg.station.rotating)
         self._beacon_sensor: BeaconSensor | None = None
         if cfg.fidelity == "beacons":
             model = detection_model(cfg.detection_model, detector)
-            self._beacon_sensor = BeaconSensor(*optics, detector, model=model, rotating=cfg.station.rotating)
+            self._beacon_sensor = BeaconSensor(*self._optics, detector, model=model, rotating=cfg.station.rotating)
+
+    @cached_property
+    def imager(self) -> UnderwaterCamera:
+        """The camera that renders; made when first asked for, since the `beacons` fidelity does without."""
+        return UnderwaterCamera(*self._optics, scene=self.simulator, rotating=self.cfg.station.rotating)
 
     def _draw_start(self, rng: np.random.Generator) -> Start:
         position_m, quat_wxyz = draw_start(self.cfg.start, self.cfg.station.depth_m, rng)
@@ -97,4 +102,5 @@ class DockingWorld(VehicleWorld):
 
     def close(self) -> None:
         """Release the renderer."""
-        self.imager.close()
+        if "imager" in vars(self):
+            self.imager.close()

@@ -16,6 +16,7 @@ from auvdock.campaign.plan import EpisodeSpec
 from auvdock.campaign.row import Row, lost_row
 from auvdock.campaign.worker import THREAD_LIMITS
 from auvdock.core.errors import AuvdockError, ConfigError
+from auvdock.core.memory import relax_collector
 
 __all__ = ["RayExecutor"]
 
@@ -202,6 +203,7 @@ class _Remote:
         self._refusal: AuvdockError | None = None
         try:
             self._run = job.build()
+            relax_collector()
         except AuvdockError as error:
             self._refusal = error
 

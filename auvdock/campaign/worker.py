@@ -14,6 +14,7 @@ import cv2
 from auvdock.campaign.executor import peak_rss_mb
 from auvdock.campaign.job import Job, attempt
 from auvdock.core.errors import AuvdockError
+from auvdock.core.memory import relax_collector
 
 __all__ = ["READY", "THREAD_LIMITS", "work"]
 
@@ -41,6 +42,7 @@ def work(connection: Connection, job: Job) -> None:
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the parent has gone
         try:
             run = job.build()
+            relax_collector()
             connection.send(READY)
             while (spec := connection.recv()) is not None:
                 connection.send((attempt(run, spec), peak_rss_mb()))

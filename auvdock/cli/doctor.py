@@ -20,7 +20,7 @@ from auvdock.core.errors import AuvdockError
 
 __all__ = ["Check", "Doctor", "examine", "run"]
 
-PACKAGES = ("mujoco", "gymnasium", "numpy", "scipy", "opencv-python-headless", "onnxruntime", "filterpy", "control")
+PACKAGES = ("mujoco", "gymnasium", "numpy", "scipy", "opencv-python-headless", "onnxruntime", "control")
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 
 from auvdock.core.errors import AuvdockError
+from auvdock.core.memory import relax_collector
 
 __all__ = ["COMMANDS", "main"]
 
@@ -49,6 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _usage(words)
         module, function = COMMANDS[command][0].split(":")
         run: Callable[[Sequence[str], str], int] = getattr(import_module(module), function)
+        relax_collector()
         return run(words[len(command) :], "auvdock " + " ".join(command))
     except AuvdockError as error:
         print(f"auvdock: error: {error}", file=sys.stderr)

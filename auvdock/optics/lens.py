@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 
@@ -14,38 +15,24 @@ __all__ = ["Lens"]
 
 
 class Lens:
-    """A camera's geometry, precomputed once on a coarse grid of pixels.
+    """A camera's geometry, on a coarse grid of pixels.
+
+    The maps are made when first asked for: where nothing is rendered nobody does, and they take 40 ms.
 
     Attributes:
         factor: image pixels per coarse pixel (4 at 640 × 360 and at 800 × 600).
         shape: (rows, columns) of the coarse grid.
-        rays: (rows × columns, 3) unit rays through the coarse pixels' centres.
-        metric: (rows, columns, 3) tensor g11, g12, g22: an offset (x, y) px subtends √(g11 x² + 2 g12 x y + g22 y²).
-        solid_angle_sr: (rows, columns) solid angle of one image pixel, √det g.
         aperture_m2: area of the entrance pupil times the lens' transmission.
         rad_per_px: angle of a pixel in the middle of the image.
         max_tangent: tangent of the angle between the optical axis and the farthest corner of the image.
     """
 
     def __init__(self, camera: Camera, cfg: ImagingCfg) -> None:
-        """Precompute the maps."""
+        """Precompute what every frame needs."""
         self.camera = camera
         self.factor = _coarse_factor(camera.width_px)
         columns, rows = -(-camera.width_px // self.factor), -(-camera.height_px // self.factor)
         self.shape = (rows, columns)
-        self._x = (np.arange(columns) + 0.5) * self.factor - 0.5
-        self._y = (np.arange(rows) + 0.5) * self.factor - 0.5
-        grid: Array = np.stack(np.meshgrid(self._x, self._y), axis=2).reshape(-1, 2).astype(np.float64)
-        right, down = np.array([0.5, 0.0]), np.array([0.0, 0.5])
-        self.rays = camera.rays(grid)
-        along_x = camera.rays(grid + right) - camera.rays(grid - right)
-        along_y = camera.rays(grid + down) - camera.rays(grid - down)
-        g11, g12, g22 = (
-            np.einsum("ij,ij->i", one, other)
-            for one, other in ((along_x, along_x), (along_x, along_y), (along_y, along_y))
-        )
-        self.metric = np.column_stack([g11, g12, g22]).reshape(rows, columns, 3)
-        self.solid_angle_sr = np.sqrt(g11 * g22 - g12 * g12).reshape(rows, columns)
         k1, k2, p1, p2, k3 = (float(k) for k in camera.distortion)
         self._radial = (k1, k2, k3) if p1 == 0.0 and p2 == 0.0 else None
         self._only_k1 = k2 == 0.0 and k3 == 0.0
@@ -60,6 +47,37 @@ class Lens:
         corner = camera.normalise(np.array([[-0.5, -0.5], [last_x, last_y], [last_x, -0.5], [-0.5, last_y]]))
         self._max_tangent2 = float(np.max(np.sum(corner**2, axis=1)))
         self.max_tangent = math.sqrt(self._max_tangent2)
+
+    @cached_property
+    def rays(self) -> Array:
+        """(rows × columns, 3) unit rays through the coarse pixels' centres."""
+        return self.camera.rays(self._grid())
+
+    @cached_property
+    def metric(self) -> Array:
+        """(rows, columns, 3) tensor g11, g12, g22: an offset (x, y) px subtends √(g11 x² + 2 g12 x y + g22 y²)."""
+        camera, grid = self.camera, self._grid()
+        right, down = np.array([0.5, 0.0]), np.array([0.0, 0.5])
+        along_x = camera.rays(grid + right) - camera.rays(grid - right)
+        along_y = camera.rays(grid + down) - camera.rays(grid - down)
+        pairs = ((along_x, along_x), (along_x, along_y), (along_y, along_y))
+        parts = [np.einsum("ij,ij->i", one, other) for one, other in pairs]
+        metric: Array = np.column_stack(parts).reshape(*self.shape, 3)
+        return metric
+
+    @cached_property
+    def solid_angle_sr(self) -> Array:
+        """(rows, columns) solid angle of one image pixel, √det g."""
+        g11, g12, g22 = np.moveaxis(self.metric, 2, 0)
+        determinant: Array = g11 * g22 - g12 * g12
+        return np.sqrt(determinant)
+
+    def _grid(self) -> Array:
+        """(rows × columns, 2) the coarse pixels' centres."""
+        rows, columns = self.shape
+        x, y = ((np.arange(count) + 0.5) * self.factor - 0.5 for count in (columns, rows))
+        grid: Array = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2).astype(np.float64)
+        return grid
 
     def metric_at(self, pixels: Array) -> Array:
         """(n, 3) metric tensors at pixels (n, 2); outside the image those of the border."""

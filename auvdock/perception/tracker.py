@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.common import Q_discrete_white_noise
 from scipy.optimize import linear_sum_assignment
 
 from auvdock.core.arrays import Array, BoolArray, IntArray
@@ -80,8 +79,8 @@ class LightTracker:
         """Precompute the filter's constants for a camera's rate and size."""
         self._cfg = cfg
         self._dt = 1.0 / rate_hz
-        noise = np.asarray(Q_discrete_white_noise(2, self._dt, cfg.acceleration_px_s2**2), dtype=np.float64)
-        self._q = (float(noise[0, 0]), float(noise[0, 1]), float(noise[1, 1]))
+        dt, power = self._dt, cfg.acceleration_px_s2**2
+        self._q = (0.25 * dt**4 * power, 0.5 * dt**3 * power, dt**2 * power)
         self._gate = cfg.gate_sigmas**2
         self._variance = cfg.pixel_sigma_px**2
         margin = 0.1

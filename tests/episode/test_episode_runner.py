@@ -153,3 +153,11 @@ def test_interrupt_leaves_a_readable_recording(tmp_path):
     reader = RrdReader(path)
     paths = {chunk.entity_path for entry in reader.recordings() for chunk in reader.stream(store=entry)}
     assert len(paths) > 5
+
+
+def test_beacons_make_no_camera_image_and_no_maps_of_it() -> None:
+    """What only a renderer needs is not built: a campaign's worlds stay small and quick to make."""
+    world = EpisodeRunner(level_cfg(1).override({"world": {"fidelity": "beacons"}})).world
+    assert "imager" not in vars(world)
+    world.close()
+    assert "imager" not in vars(world)
