@@ -120,7 +120,7 @@ class FilterCfg:
 class LandingPerceptionCfg:
     """How a landing vehicle sees."""
 
-    detector: str = "threshold"
+    detector: str = "cores"
     """Of lights: "cores" (for near lights), "threshold", "blob" or your own as "package.module:Name"."""
     tag_detector: str = "apriltag"
     """Of the tag: "apriltag", or "contour" (paper C's way: Canny, contours, quadrilateral)."""

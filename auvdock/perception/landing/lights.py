@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
@@ -126,18 +128,19 @@ class LightLevel:
         return self._solve(detections, named, attitude, (T_station_camera, "tracked"))
 
     def _solve(self, detections: Detections, named: IntArray, attitude: Array, start: _Start) -> NamedLights | None:
-        """The pose of named lights; one that does not fit may be left out where more than three remain."""
-        found = self._refined(detections, named, attitude, start)
-        if found is not None or int((named >= 0).sum()) <= _MIN_LIGHTS:
-            return found
-        best: NamedLights | None = None
-        for light in np.flatnonzero(named >= 0):
-            fewer = named.copy()
-            fewer[light] = -1
-            found = self._refined(detections, fewer, attitude, start)
-            if found is not None and (best is None or found.pose.cost < best.pose.cost):
-                best = found
-        return best
+        """The pose of the named lights; if they fit none, that of most of them that does, three at least."""
+        lights = np.flatnonzero(named >= 0)
+        for left_out in range(max(len(lights) - _MIN_LIGHTS, 0) + 1):
+            best: NamedLights | None = None
+            for out in combinations(lights.tolist(), left_out):
+                fewer = named.copy()
+                fewer[list(out)] = -1
+                found = self._refined(detections, fewer, attitude, start)
+                if found is not None and (best is None or found.pose.cost < best.pose.cost):
+                    best = found
+            if best is not None:
+                return best
+        return None
 
     def _refined(self, detections: Detections, named: IntArray, attitude: Array, start: _Start) -> NamedLights | None:
         lights = np.flatnonzero(named >= 0)

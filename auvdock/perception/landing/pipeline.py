@@ -51,6 +51,7 @@ class LandingPercept(Percept):
             is carried on by dead reckoning alone, "lost" once both levels have been silent for too long.
         missed_lights: C_L, consecutive frames without level I.
         missed_tag: C_A, consecutive frames without level II.
+        tags: the frame's tags.
     """
 
     lights: PoseEstimate | None = None
@@ -59,6 +60,7 @@ class LandingPercept(Percept):
     status: str = "searching"
     missed_lights: int = 0
     missed_tag: int = 0
+    tags: tuple[TagDetection, ...] = ()
 
 
 class LandingPerception:
@@ -130,6 +132,7 @@ class LandingPerception:
             status=self._status,
             missed_lights=self._missed_lights,
             missed_tag=self._missed_tag,
+            tags=tuple(tags),
         )
 
     def _forget(self) -> None:

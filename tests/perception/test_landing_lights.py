@@ -1,0 +1,141 @@
+"""Level I: names of lights with dead, hidden and false ones; refusals; the bearing to the group."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from landing_scenes import CAMERA, LIGHTS, STATION, Descent, Senses
+
+from auvdock.core.arrays import Array
+from auvdock.core.contracts import BLUE, Detections
+from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
+from auvdock.perception.landing.bearing import group_bearing
+from auvdock.perception.landing.config import AttitudeCfg, LandingPerceptionCfg, LightLevelCfg
+from auvdock.perception.landing.level import LevelSolver, pose_offset
+from auvdock.perception.landing.lights import LightLevel
+from auvdock.perception.landing.pipeline import LandingPerception
+from auvdock.perception.tracker import LightTracker, TrackerCfg
+
+LEVEL = LightLevel(LightLevelCfg(), STATION, CAMERA, LevelSolver(AttitudeCfg(), CAMERA))
+
+
+def sight(seed: int, tilt_error_deg: float = 0.2, heading_error_deg: float = 1.0) -> tuple[Array, Array, Array, float]:
+    """(T_station_camera, measured attitude, pixels of the lights, measured height): all five in view."""
+    rng = np.random.default_rng(seed)
+    while True:
+        euler = np.radians([*rng.uniform(-4.0, 4.0, 2), rng.uniform(-45.0, 45.0)])
+        height = rng.uniform(2.6, 6.3)
+        position = np.array([*rng.uniform(-0.3, 0.3, 2) * height, height])
+        body = make_transform(rotation_from_euler_zyx(*euler.tolist()), position)
+        T = body @ CAMERA.T_body_camera
+        q = (LIGHTS - T[:3, 3]) @ T[:3, :3]
+        if CAMERA.in_view(q).all():
+            break
+    error = np.radians([*rng.normal(0.0, tilt_error_deg, 2), rng.normal(0.0, heading_error_deg)])
+    attitude = rotation_from_euler_zyx(*(euler + error).tolist()) @ CAMERA.T_body_camera[:3, :3]
+    return T, attitude, CAMERA.project(q), float(T[2, 3] + rng.normal(0.0, 0.03))
+
+
+def seen(pixels: Array, rng: np.random.Generator, stray: int = 0, sigma_px: float = 0.15) -> Detections:
+    """Noisy pixels and strays, shuffled."""
+    spots = np.vstack([pixels + rng.normal(0.0, sigma_px, pixels.shape), rng.uniform(0.0, (800.0, 600.0), (stray, 2))])
+    spots = spots[rng.permutation(len(spots))]
+    return Detections.from_points(spots, np.full(len(spots), 0.9), np.full(len(spots), BLUE), 0.01)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), stray=st.integers(0, 5))
+def test_all_five(seed: int, stray: int):
+    """Five lights among up to five strays: right pose (0.15 m, 0.5°, five of its σ), every light named."""
+    T, attitude, pixels, height = sight(seed)
+    found = LEVEL.find(seen(pixels, np.random.default_rng(seed), stray), attitude, height)
+    assert found is not None
+    assert found.count >= 4
+    error = pose_offset(T, found.pose.T_station_camera)
+    assert float(np.abs(error[:3]).max()) < 0.15
+    assert float(np.abs(error[5])) < math.radians(0.5)
+    assert float(error @ np.linalg.solve(found.pose.estimate.covariance, error)) < 60.0
+
+
+def test_two_dead_lights():
+    """Any three of the five give the right pose or none; most give one."""
+    given_up = 0
+    total = 0
+    for seed in range(60):
+        T, attitude, pixels, height = sight(seed)
+        rng = np.random.default_rng(seed)
+        kept = np.sort(rng.permutation(5)[:3])
+        found = LEVEL.find(seen(pixels[kept], rng), attitude, height)
+        total += 1
+        if found is None:
+            given_up += 1
+            continue
+        assert float(np.abs(pose_offset(T, found.pose.T_station_camera)[:3]).max()) < 0.25
+    assert given_up <= 0.1 * total
+
+
+def test_strays_alone_give_no_pose():
+    """Eight random spots: a first pose needs three consecutive frames that agree, and never gets them."""
+    rng = np.random.default_rng(1)
+    senses = Senses(Descent(np.array([0.0, 0.0, 4.0]), 0.0, 4.0), rng)
+    perception = LandingPerception(LandingPerceptionCfg(), CAMERA, STATION)
+    for k in range(200):
+        spots = rng.uniform(0.0, (800.0, 600.0), (8, 2))
+        detections = Detections.from_points(spots, np.full(8, 0.9), np.full(8, BLUE), 0.01)
+        assert perception.update(detections, (), senses.proprioception(k / 20)).pose is None
+
+
+def test_a_mirrored_or_scaled_pattern_is_refused():
+    """What is no view of the station has no pose: the pattern mirrored, or at twice the height of the gauge."""
+    T, attitude, pixels, height = sight(4)
+    rng = np.random.default_rng(4)
+    mirrored = pixels.copy()
+    mirrored[:, 1] = 2.0 * mirrored[:, 1].mean() - mirrored[:, 1]
+    found = LEVEL.find(seen(mirrored, rng), attitude, height)
+    assert found is None or found.count < 4
+    assert LEVEL.find(seen(pixels, rng), attitude, 2.0 * float(T[2, 3])) is None
+
+
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_too_few(n: int):
+    T, attitude, pixels, height = sight(2)
+    detections = seen(pixels[:n], np.random.default_rng(0))
+    assert LEVEL.find(detections, attitude, height) is None
+    assert LEVEL.follow(detections, attitude, T, 1e-6 * np.eye(6)) is None
+
+
+def test_follow_with_strays_and_dead_lights():
+    """Where the lights are expected to 2 cm, three of them among ten strays mostly do, and never mislead."""
+    lost = 0
+    for seed in range(40):
+        T, attitude, pixels, _ = sight(seed)
+        rng = np.random.default_rng(seed)
+        kept = np.sort(rng.permutation(5)[:3])
+        expected = T.copy()
+        expected[:3, 3] += rng.normal(0.0, 0.02, 3)
+        found = LEVEL.follow(seen(pixels[kept], rng, 10), attitude, expected, np.diag([0.02**2] * 3 + [0.003**2] * 3))
+        lost += found is None
+        if found is not None:
+            assert float(np.abs(pose_offset(T, found.pose.T_station_camera)[:3]).max()) < 0.1
+    assert lost <= 4
+
+
+def test_group_bearing():
+    """Direction to the lights' centre within 2°, range within a fifth; nothing from nothing."""
+    tracks = LightTracker(TrackerCfg(), 20.0, 800, 600)
+    assert group_bearing(tracks, CAMERA, LIGHTS) is None
+    T, _, pixels, _ = sight(3)
+    rng = np.random.default_rng(3)
+    for _ in range(4):
+        tracks.update(seen(pixels, rng))
+    bearing = group_bearing(tracks, CAMERA, LIGHTS)
+    assert bearing is not None
+    assert bearing.range_m is not None
+    centre = (LIGHTS.mean(axis=0) - T[:3, 3]) @ T[:3, :3]
+    distance = float(np.linalg.norm(centre))
+    assert float(bearing.ray_camera @ centre) / distance > math.cos(math.radians(2.0))
+    assert bearing.range_m == pytest.approx(distance, rel=0.2)
