@@ -22,9 +22,10 @@ from auvdock.envs.config import WorldCfg
 from auvdock.envs.world import DockingWorld
 from auvdock.optics.detection_fit import Observation, fit_detection_model, observe
 from auvdock.optics.detection_model import DetectionModelCfg
+from auvdock.optics.tag_model import TagModelCfg
 from auvdock.perception.detectors import make_detector
 
-__all__ = ["FitDetector", "run", "sample_poses"]
+__all__ = ["FitDetector", "run", "sample_poses", "write_model"]
 
 CONDITIONS = (("clear", None), ("pool", None), ("lake", None), ("pool", 0.8))
 """Waters and attenuations that the fit covers."""
@@ -63,10 +64,7 @@ def run(argv: Sequence[str], prog: str) -> int:
     names = ", ".join(f"{water} c={c:g}" if c else water for water, c in CONDITIONS)
     source = f"auvdock fit-detector {args.detector} --frames {args.frames} --seed {args.seed}; waters {names}"
     model = fit_detection_model(args.detector, source, observations)
-    try:
-        args.out.write_text(_toml(model), encoding="utf-8")
-    except OSError as error:
-        raise ConfigError("out", str(args.out), f"a file that can be written ({error.strerror})") from error
+    write_model(model, args.out, "out")
     console.print(f"{len(observations)} frames; wrote {args.out}", highlight=False)
     return 0
 
@@ -85,7 +83,24 @@ def sample_poses(count: int, station_depth_m: float, rng: np.random.Generator) -
     return poses
 
 
-def _toml(model: DetectionModelCfg) -> str:
+def write_model(model: DetectionModelCfg | TagModelCfg, path: Path, field: str) -> None:
+    """Write a fitted model as TOML.
+
+    Args:
+        model: the model.
+        path: where to.
+        field: the option that gave the path, for the error.
+
+    Raises:
+        ConfigError: a file that cannot be written.
+    """
+    try:
+        path.write_text(_toml(model), encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(field, str(path), f"a file that can be written ({error.strerror})") from error
+
+
+def _toml(model: DetectionModelCfg | TagModelCfg) -> str:
     lines: list[str] = []
     for name, value in dataclasses.asdict(model).items():
         if value is None:

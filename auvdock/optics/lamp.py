@@ -84,15 +84,42 @@ class VehicleLamp:
 
     def irradiance(self, points_camera: Array) -> Array:
         """(n, 3) irradiance per band on surfaces at points (n, 3) of the camera frame that face along the axis."""
-        light = np.zeros((len(points_camera), 3))
+        points = np.asarray(points_camera, dtype=np.float64)
+        light = np.zeros((len(points), 3))
         for position in self._positions:
-            offset = points_camera - position
+            offset = points - position
             d2 = np.maximum(np.einsum("ij,ij->i", offset, offset), _LEAST_M2)
             d = np.sqrt(d2)
             cosine = np.maximum(offset[:, 2] / d, 0.0)
             shape = beam_profile(np.arccos(np.minimum(cosine, 1.0)), self.cfg.beam_angle_deg) * cosine / d2
             light += shape[:, None] * np.exp(-d[:, None] * self._loss_per_m)
         return light * self.peak_w_sr
+
+    def irradiance_along(self, rays: NDArray[np.float32], distance: NDArray[np.float32]) -> NDArray[np.float32]:
+        """`irradiance` (n, 3) at distances (n,) along unit rays (n, 3), in single precision and faster.
+
+        The angle from the axis is taken as θ² = 2 (1 - cos θ) (1 + (1 - cos θ) / 6), 1 % low at 70°.
+        """
+        light = np.zeros((len(rays), 3), dtype=np.float32)
+        loss = -self._loss_per_m.astype(np.float32)
+        half = math.radians(self.cfg.beam_angle_deg) / 2.0
+        narrow = np.float32(-2.0 * math.log(2.0) / half**2)
+        for position in self._positions.astype(np.float32):
+            # |s r - p|² = s² - 2 s (r · p) + p²
+            d2 = distance - 2.0 * (rays @ position)
+            d2 *= distance
+            d2 += float(position @ position)
+            np.maximum(d2, np.float32(_LEAST_M2), out=d2)
+            d = np.sqrt(d2)
+            cosine = (rays[:, 2] * distance - position[2]) / d
+            np.clip(cosine, 0.0, 1.0, out=cosine)
+            versed = 1.0 - cosine
+            versed *= narrow * (1.0 + versed * np.float32(1.0 / 6.0))
+            shape = cosine / d2
+            for band in range(3):
+                light[:, band] += shape * cv2.exp(versed + loss[band] * d).ravel()
+        light *= self.peak_w_sr.astype(np.float32)
+        return light
 
     def brightest(self, distance_m: Array) -> Array:
         """(n, 3) upper bound of the irradiance on anything at distances (n,) from the camera."""

@@ -20,7 +20,7 @@ class Lens:
     The maps are made when first asked for: where nothing is rendered nobody does, and they take 40 ms.
 
     Attributes:
-        factor: image pixels per coarse pixel (4 at 640 × 360 and at 800 × 600).
+        factor: image pixels per coarse pixel (4 at 640 × 360, 6 at 800 × 600).
         shape: (rows, columns) of the coarse grid.
         aperture_m2: area of the entrance pupil times the lens' transmission.
         rad_per_px: angle of a pixel in the middle of the image.
@@ -125,4 +125,4 @@ _AHEAD = np.array([0.0, 0.0, 1.0])
 def _coarse_factor(width_px: int) -> int:
     """Image pixels per coarse pixel: some 160 columns, and a multiple of 2 or 3 so that surfaces fit in between."""
     factor = max(1, round(width_px / 160))
-    return factor if factor % 2 == 0 or factor % 3 == 0 else max(1, factor - 1)
+    return factor if factor % 2 == 0 or factor % 3 == 0 else factor + 1 if factor > 1 else 1

@@ -94,7 +94,13 @@ class BeaconSensor:
 
 
 def candidates_in_view(
-    lit: LitScene, view: View, spots: Spots, exposure_s: float, gain: float, background_px: float = _BACKGROUND_PX
+    lit: LitScene,
+    view: View,
+    spots: Spots,
+    exposure_s: float,
+    gain: float,
+    background_px: float = _BACKGROUND_PX,
+    ground_e_s: Array | None = None,
 ) -> tuple[Candidates, float]:
     """The lights on the sensor as a detector meets them, and the saturated share of the image.
 
@@ -107,6 +113,7 @@ def candidates_in_view(
         exposure_s: exposure time.
         gain: analogue gain.
         background_px: radius at which the detector takes a flash's halo for background.
+        ground_e_s: (3,) electrons per second and pixel of the surfaces behind the lights, in place of the veil.
     """
     pixels = view.pixels.compress(view.inside, 0)
     scale = lit.scale(gain)
@@ -121,7 +128,9 @@ def candidates_in_view(
     around = np.add.reduce(level, axis=1)
     own = level.diagonal().copy()
     around -= own
-    if lit.nuisance.daylight != "none":
+    if ground_e_s is not None:
+        around += ground_e_s[best] * exposure_s
+    elif lit.nuisance.daylight != "none":
         veil = lit.veil_e_s(-float(view.T_world_camera[2, 3])) * exposure_s
         around += veil[best]
         share += veil_share(veil, scale.saturated_e)

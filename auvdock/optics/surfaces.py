@@ -145,7 +145,7 @@ class Surfaces:
         weight /= d2
         light = weight @ self._spill_w_sr.astype(np.float32)
         if self._lit.lamp is not None:
-            light += self._lit.lamp.irradiance(np.asarray(points, dtype=np.float64))
+            light += self._lit.lamp.irradiance_along(self._rays, self.distance.ravel())
         return light.reshape(rows, columns, 3)
 
 

@@ -21,7 +21,9 @@ __all__ = ["TagImage"]
 
 _NO_MAP: NDArray[np.float32] = np.empty(0, dtype=np.float32)
 _PAD_PX = 5
-_KNOTS = 7
+_TEXEL_PX = 0.8
+"""Distance of the texture's texels in pixels."""
+_KNOTS = 9
 _COVER = 0.25
 """Reflectance of what covers a hidden tag: grey silt."""
 
@@ -126,7 +128,10 @@ class TagImage:
         gradient = np.column_stack([cells[0] - cells[1], cells[2] - cells[3]])
         per_px = np.hypot(gradient[:, 0], gradient[:, 1])
         sigma = self._sigma_px * per_px
-        return float(sigma[0]), float(sigma[1]), 0.5 * float(per_px.min())
+        step = _TEXEL_PX * float(per_px.min())
+        # Reading between texels is itself a blur: a triangle of variance step² / 6.
+        sigma = np.sqrt(np.maximum(sigma**2 - step**2 / 6.0, 0.0))
+        return float(sigma[0]), float(sigma[1]), step
 
     def _shading(
         self, region: tuple[int, int, int, int], back: Array, T_world_camera: Array, exposure_s: float
@@ -134,8 +139,10 @@ class TagImage:
         """Electrons per unit of reflectance and of the veil (h, w, 3), computed at a few points and enlarged."""
         x0, y0, x1, y1 = region
         scene = self.scene
-        x, y = np.linspace(x0, x1 - 1, _KNOTS), np.linspace(y0, y1 - 1, _KNOTS)
-        columns, rows = np.rint(x).astype(int), np.rint(y).astype(int)
+        share = (np.arange(_KNOTS) + 0.5) / _KNOTS
+        x, y = x0 + share * (x1 - x0) - 0.5, y0 + share * (y1 - y0) - 0.5
+        columns = np.clip(np.rint(x).astype(int), x0, x1 - 1)
+        rows = np.clip(np.rint(y).astype(int), y0, y1 - 1)
         tangents = self._lens_map()[np.ix_(rows, columns)].reshape(-1, 2).astype(np.float64)
         cells = np.column_stack([tangents, np.ones(len(tangents))]) @ back.T
         cells /= cells[:, 2:]
@@ -162,16 +169,8 @@ class TagImage:
 
 
 def _enlarge(values: Array, region: tuple[int, int, int, int]) -> NDArray[np.float32]:
-    """Bilinear (h, w, 3) from knots (k², 3) that span a region from its first pixel's centre to its last's."""
+    """Bilinear (h, w, 3) over a region, from the centres (k², 3) of its k × k parts."""
     x0, y0, x1, y1 = region
     knots = values.reshape(_KNOTS, _KNOTS, 3).astype(np.float32)
-    across = np.linspace(0.0, _KNOTS - 1.0, x1 - x0).astype(np.float32)
-    down = np.linspace(0.0, _KNOTS - 1.0, y1 - y0).astype(np.float32)
-    x, y = _weights(across, x1 - x0), _weights(down, y1 - y0)
-    rows = np.tensordot(y, knots, axes=(1, 0))
-    return np.ascontiguousarray(np.einsum("ij,kjc->kic", x, rows), dtype=np.float32)
-
-
-def _weights(place: NDArray[np.float32], count: int) -> NDArray[np.float32]:
-    """(count, knots) hat functions at places (count,)."""
-    return np.maximum(1.0 - np.abs(place[:, None] - np.arange(_KNOTS, dtype=np.float32)), 0.0).astype(np.float32)
+    whole = cv2.resize(knots, (x1 - x0, y1 - y0), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(whole, dtype=np.float32)
