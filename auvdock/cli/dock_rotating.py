@@ -10,16 +10,13 @@ from typing import Annotated, Any
 import tyro
 
 from auvdock.cli.dock import DockConical, run_dock
-from auvdock.core.beacons import BeaconCfg
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import to_plain
 from auvdock.envs.config import rotating_world_cfg
 from auvdock.episode.config import EpisodeCfg
+from auvdock.experiments.rotating_docking import FALSE_LIGHT
 
-__all__ = ["FALSE_LIGHT", "DockRotating", "run_rotating"]
-
-FALSE_LIGHT = BeaconCfg("false", "long_range", (-1.0, 4.0, 1.2), (-1.0, 1.0, 0.0), 450.0, 30.0, 0.35, 360.0)
-"""A steady blue lamp of the beacon's power that shines all around, 4 m beside the station."""
+__all__ = ["DockRotating", "run_rotating"]
 
 
 def _base() -> EpisodeCfg:

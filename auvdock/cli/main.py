@@ -30,6 +30,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.plan_design:run_guidance_design",
         "optimised arrays against paper A's ring of six",
     ),
+    ("reproduce", "rotating-docking"): (
+        "auvdock.cli.reproduce_rotating:run_rotating_docking",
+        "docking by the rotating beacon, with and without it",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),
