@@ -14,6 +14,7 @@ from auvdock.recording import paths
 from auvdock.recording.modes import ModeFollower
 from auvdock.recording.palette import CANDIDATE, IDENTIFIED, LOST, class_colours
 from auvdock.recording.pose_error import camera_in_station, pose_errors
+from auvdock.recording.rotating import write_rotating
 
 if TYPE_CHECKING:
     from auvdock.core.contracts import Percept, PoseEstimate
@@ -60,6 +61,10 @@ class ColumnWriter:
         batch = _Batch(self._stream, frames, times_s)
         self._write_motion(batch, rows, T_world_body)
         self._write_pose(batch, rows, T_world_body)
+        T_station_camera = camera_in_station(
+            self._setup.T_world_station, T_world_body, self._setup.camera.T_body_camera
+        )
+        write_rotating(batch, [row.tick for row in rows], self._setup, T_station_camera)
         self._write_lights(batch, rows)
         self._write_modes(batch, rows)
         _write_images(batch, rows)

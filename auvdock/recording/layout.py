@@ -8,6 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from auvdock.recording import paths
+from auvdock.recording.rotating import beacon_of, rotating_views
 
 if TYPE_CHECKING:
     from auvdock.episode.trace import EpisodeSetup
@@ -20,7 +21,7 @@ def make_blueprint(setup: EpisodeSetup) -> rrb.Blueprint:
     return rrb.Blueprint(
         rrb.Horizontal(
             _scene(setup),
-            rrb.Vertical(_camera(), _plots(), _modes(), row_shares=[5, 4, 3]),
+            rrb.Vertical(_camera(), _plots(setup), _modes(), row_shares=[5, 4, 3]),
             column_shares=[1, 1],
         ),
         rrb.TimePanel(state="collapsed", timeline=paths.SIM_TIME),
@@ -65,8 +66,10 @@ def _plot(name: str, path: str) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(name=name, origin=path, plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop))
 
 
-def _plots() -> rrb.Tabs:
+def _plots(setup: EpisodeSetup) -> rrb.Tabs:
+    rotating = () if beacon_of(setup) is None else (rotating_views(),)
     return rrb.Tabs(
+        *rotating,
         rrb.Vertical(
             _plot("Pose error against truth, m", paths.POSE_ERROR),
             _plot("Pose error against truth, deg", paths.POSE_ANGLE),

@@ -8,7 +8,7 @@ from auvdock.recording.palette import rgba
 
 __all__ = ["KNOWN_MODES", "MODE_COLOURS", "ModeChange", "ModeFollower"]
 
-KNOWN_MODES = ("acquire", "far", "mid", "near", "terminal", "docked", "abort")
+KNOWN_MODES = ("acquire", "far", "mid", "near", "terminal", "docked", "abort", "approach", "circle", "lineup")
 """Modes of the package's own pilots, numbered from 0; those of a user's pilot get the numbers after them."""
 
 MODE_COLOURS = (
@@ -19,6 +19,9 @@ MODE_COLOURS = (
     rgba(220, 110, 50),
     rgba(70, 170, 90),
     rgba(200, 60, 60),
+    rgba(150, 110, 200),
+    rgba(190, 120, 190),
+    rgba(110, 130, 220),
 )
 
 

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 __all__ = [
     "APPLICATION_ID",
+    "AZIMUTH",
+    "AZIMUTH_BELIEVED",
+    "AZIMUTH_FIX",
+    "AZIMUTH_TRUE",
     "BEAMS",
     "BEARINGS",
+    "BELIEVED",
     "CAMERA",
     "COMMANDS",
     "CONTACT",
@@ -26,7 +31,9 @@ __all__ = [
     "POSE_ANGLE",
     "POSE_ERROR",
     "RANGE",
+    "RANGE_SIGMA",
     "REPROJECTION",
+    "ROTATING_BEAM",
     "SIM_TIME",
     "SPEED",
     "STATION",
@@ -50,6 +57,8 @@ FUNNEL = "/world/station/funnel"
 TUBE = "/world/station/tube"
 LIGHTS = "/world/station/lights"
 BEAMS = "/world/station/beams"
+ROTATING_BEAM = "/world/station/rotating_beam"
+"""Frame of the rotating beacon's beam by the vehicle's clock: x along the beam, but for its elevation."""
 VEHICLE = "/world/vehicle"
 HULL = "/world/vehicle/hull"
 CAMERA = "/world/vehicle/camera"
@@ -61,6 +70,8 @@ PATH = "/world/camera_path"
 """True path of the camera, comparable with `ESTIMATES`."""
 ESTIMATES = "/world/camera_estimates"
 """Camera positions from measured poses."""
+BELIEVED = "/world/believed"
+"""Where the pilot believes the camera to be, by the rotating beacon: two standard deviations."""
 CURRENT_ARROW = "/world/current"
 
 POSE_ERROR = "/plots/pose_error_m"
@@ -72,6 +83,12 @@ LIGHT_COUNTS = "/plots/lights"
 COMMANDS = "/plots/commands"
 CURRENT = "/plots/current_m_s"
 CONTACT = "/plots/contact_n"
+
+AZIMUTH = "/plots/azimuth_deg"
+AZIMUTH_TRUE = "/plots/azimuth_deg/true"
+AZIMUTH_BELIEVED = "/plots/azimuth_deg/believed"
+AZIMUTH_FIX = "/plots/azimuth_deg/fix"
+RANGE_SIGMA = "/plots/range_sigma_m"
 
 MODE_NUMBER = "/mode/number"
 MODE_STATE = "/mode/state"

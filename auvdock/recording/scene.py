@@ -16,6 +16,7 @@ from auvdock.recording import paths
 from auvdock.recording.meshes import Mesh, beam_cone, frustum
 from auvdock.recording.modes import KNOWN_MODES, MODE_COLOURS
 from auvdock.recording.palette import rgba, wavelength_rgb
+from auvdock.recording.rotating import beacon_of, log_rotating_scene
 
 if TYPE_CHECKING:
     from auvdock.core.beacons import BeaconLayout
@@ -63,6 +64,9 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
     for path, mesh in _station_meshes(setup.station).items():
         static(path, _mesh3d(mesh, rgba(200, 205, 210, 110)))
     _log_lights(stream, setup.station.layout)
+    beacon = beacon_of(setup)
+    if beacon is not None:
+        log_rotating_scene(stream, beacon)
     static(paths.HULL, _hull(setup.vehicle))
     static(paths.CAMERA, _transform(setup.camera.T_body_camera), _pinhole(setup.camera))
     static(paths.PATH, rr.LineStrips3D.from_fields(colors=[rgba(255, 220, 80)], radii=[-1.5]))
