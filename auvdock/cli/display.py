@@ -84,6 +84,7 @@ def print_result(result: EpisodeResult, record: Path | None) -> None:
         ("heading error at entry", _degrees(result.heading_error_rad), "{:.1f}°"),
         ("entry speed", result.entry_speed_m_s, "{:.2f} m/s"),
         ("peak contact force", result.peak_contact_force_n, "{:.0f} N"),
+        *_rotating_rows(result),
         ("approaches", result.attempts, "{:d}"),
         ("wall-clock time", result.wall_s, "{:.1f} s"),
         ("real-time factor", result.real_time_factor, "{:.1f} x"),
@@ -93,6 +94,20 @@ def print_result(result: EpisodeResult, record: Path | None) -> None:
     console.print(table)
     if record is not None:
         console.print(f"recording: {record}   (auvdock view {record})", highlight=False)
+
+
+def _rotating_rows(result: EpisodeResult) -> list[tuple[str, float | int | None, str]]:
+    """What only an episode with a start all around has."""
+    if result.start_azimuth_rad is None:
+        return []
+    return [
+        ("start azimuth", _degrees(result.start_azimuth_rad), "{:+.0f}°"),
+        ("start range", result.start_range_m, "{:.1f} m"),
+        ("beacon or array found after", result.acquire_s, "{:.1f} s"),
+        ("azimuth fixes", result.azimuth_fixes, "{:d}"),
+        ("azimuth error (rms)", _degrees(result.azimuth_rms_rad), "{:.2f}°"),
+        ("azimuth error at hand-over", _degrees(result.handover_azimuth_error_rad), "{:+.2f}°"),
+    ]
 
 
 def _percent(value: float | None) -> float | None:

@@ -1,4 +1,4 @@
-"""The rotating beacon in a recording: where its beam points, the azimuths it gave, and where the pilot believes to be."""
+"""The rotating beacon in a recording: where its beam points, azimuths measured, where the pilot believes to be."""
 
 from __future__ import annotations
 

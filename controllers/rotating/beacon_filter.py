@@ -108,6 +108,7 @@ class BeaconState(NamedTuple):
         beacon_depth_m: depth of the beacon.
         depth_variance_m2: its variance.
         range_sigma_m: standard deviation along the line of sight as of the last fix.
+        cross_sigma_m: standard deviation across it.
     """
 
     bank: tuple[Hypothesis, ...]
@@ -119,6 +120,7 @@ class BeaconState(NamedTuple):
     beacon_depth_m: float
     depth_variance_m2: float
     range_sigma_m: float = math.inf
+    cross_sigma_m: float = math.inf
 
     @property
     def offset_m(self) -> tuple[float, float]:
@@ -215,7 +217,9 @@ class BeaconFilter:
         """A bank of one from a known place, as the array's poses give it; `sigma_m` is its standard deviation."""
         covariance = np.diag([sigma_m**2, sigma_m**2, 0.02**2])
         mean = (offset_m[0], offset_m[1], axis_yaw_rad)
-        return BeaconState((Hypothesis(1.0, mean, covariance),), (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2, sigma_m)
+        return BeaconState(
+            (Hypothesis(1.0, mean, covariance),), (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2, sigma_m, sigma_m
+        )
 
     def predict(self, state: BeaconState, ground_compass_m_s: tuple[float, float]) -> BeaconState:
         """Dead reckoning over one control period with the velocity over ground in level compass axes."""
@@ -274,13 +278,14 @@ class BeaconFilter:
 
 
 def _measured(state: BeaconState) -> BeaconState:
-    """The state with its uncertainty along the line of sight; worked out once a fix, since it is asked for often."""
+    """The state with its uncertainty along and across the line of sight; worked out once a fix, as it is often asked."""
     x, y = state.offset_m
     length = math.hypot(x, y)
     if length < 1e-6:
-        return state._replace(range_sigma_m=math.inf)
-    ray = np.array([x / length, y / length])
-    return state._replace(range_sigma_m=math.sqrt(max(float(ray @ state.covariance[:2, :2] @ ray), 0.0)))
+        return state._replace(range_sigma_m=math.inf, cross_sigma_m=math.inf)
+    axes = np.array([[x, -y], [y, x]]) / length
+    along, across = np.diag(axes.T @ state.covariance[:2, :2] @ axes).tolist()
+    return state._replace(range_sigma_m=math.sqrt(max(along, 0.0)), cross_sigma_m=math.sqrt(max(across, 0.0)))
 
 
 def _update(

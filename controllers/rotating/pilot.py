@@ -361,5 +361,9 @@ class RotatingPilot:
             return
         x, y = self._station_m(beacon)
         command.setpoint.update(
-            station_x_m=x, station_y_m=y, range_sigma_m=beacon.range_sigma_m, azimuth_rad=beacon.azimuth_rad
+            station_x_m=x,
+            station_y_m=y,
+            range_sigma_m=beacon.range_sigma_m,
+            cross_sigma_m=beacon.cross_sigma_m,
+            azimuth_rad=beacon.azimuth_rad,
         )
