@@ -278,7 +278,7 @@ class BeaconFilter:
 
 
 def _measured(state: BeaconState) -> BeaconState:
-    """The state with its uncertainty along and across the line of sight; worked out once a fix, as it is often asked."""
+    """The state with its uncertainty along and across the line of sight; worked out once a fix, being often asked."""
     x, y = state.offset_m
     length = math.hypot(x, y)
     if length < 1e-6:
