@@ -28,9 +28,12 @@ class ProgressDisplay:
         self._progress: Progress | None = None
         self._start_range_m: float | None = None
         self._next_plain_s = 0.0
+        self._around = False
 
     def on_start(self, setup: EpisodeSetup) -> None:
         """Show the title."""
+        # Starts all around may lie behind the station, where no way along the axis is left.
+        self._around = getattr(setup.station, "rotating", None) is not None
         self._console.print(f"auvdock: {setup.title}, water {setup.water}, detector {setup.detector}")
         if self._console.is_terminal:
             columns = (TextColumn("{task.description}"), BarColumn(40), TimeElapsedColumn())
@@ -40,7 +43,7 @@ class ProgressDisplay:
 
     def on_tick(self, tick: Tick) -> None:
         """Update the line."""
-        range_m = tick.truth.to_go_m
+        range_m = tick.truth.range_m if self._around and tick.truth.range_m > 3.0 else tick.truth.to_go_m
         if self._start_range_m is None:
             self._start_range_m = range_m
         speed_m_s = math.hypot(*(float(part) for part in tick.truth.nu_body[:3]))
@@ -62,10 +65,10 @@ class ProgressDisplay:
             self._progress = None
 
 
-def print_result(result: EpisodeResult, record: Path | None) -> None:
+def print_result(result: EpisodeResult, record: Path | None, title: str = "conical docking") -> None:
     """The result as a table on standard output."""
     console = Console()
-    table = Table(title=f"conical docking, seed {result.seed}", title_justify="left")
+    table = Table(title=f"{title}, seed {result.seed}", title_justify="left")
     table.add_column("metric")
     table.add_column("value", justify="right")
     verdict = "[green]docked[/green]" if result.success else f"[red]failed: {result.failure_reason}[/red]"

@@ -125,7 +125,8 @@ def run_dock(command: type[DockConical], argv: Sequence[str], prog: str, station
     if args.json:
         print(json.dumps(result.to_json(), allow_nan=False))
     else:
-        print_result(result, args.record)
+        titles = {"conical": "conical docking", "rotating": "docking by the rotating beacon"}
+        print_result(result, args.record, titles.get(station, station))
     return 0 if result.success else 1
 
 

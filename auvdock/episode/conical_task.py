@@ -27,8 +27,6 @@ _STAGES = {"acquire": "search", "abort": "timeout", "docked": "terminal"}
 class ConicalTask:
     """Implements `auvdock.episode.task.Task` for `EpisodeCfg`."""
 
-    name = "conical station"
-
     def __init__(self, cfg: EpisodeCfg) -> None:
         """Build world, detector, perception and pilot.
 
@@ -37,6 +35,7 @@ class ConicalTask:
         """
         self._cfg = cfg
         self.station = cfg.world.station
+        self.name = "conical station" if self.station.rotating is None else "rotating beacon"
         self.detector = cfg.perception.detector
         self._detector = make_station_detector(self.detector, self.station)
         self.world = DockingWorld(cfg.world, self.detector)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from auvdock.controllers.modes import MODES
+from auvdock.controllers.rotating.modes import ROTATING_MODES
 from auvdock.core.contracts import BLUE, RED
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 from auvdock.recording.meshes import Mesh, beam_cone, frustum
@@ -108,7 +109,8 @@ def test_classes_differ_and_unknown_ones_have_a_colour() -> None:
 
 
 def test_modes_are_numbered_and_only_changes_are_told() -> None:
-    assert KNOWN_MODES == MODES
+    assert KNOWN_MODES[: len(MODES)] == MODES
+    assert set(ROTATING_MODES) < set(KNOWN_MODES)
     follower = ModeFollower()
     assert [follower.number(mode) for mode in KNOWN_MODES] == list(range(len(KNOWN_MODES)))
     own = follower.number("spiral")
