@@ -21,8 +21,12 @@ class HoverDesignCfg(DesignCfg):
 
     surge_m_s: float = 0.1
     """Speed through the water at which the vehicle is linearised: a station-keeping vehicle's in a weak current."""
-    surge_crossover_rad_s: float = 1.2
+    surge_crossover_rad_s: float = 1.9
     """Gain crossover of the surge speed loop."""
+    sway_crossover_rad_s: float = 2.2
+    """Gain crossover of the sway velocity loop."""
+    velocity_margin_deg: float = 60.0
+    """Phase margin for which the velocity loops are designed."""
     pitch_crossover_rad_s: float = 2.5
     """Gain crossover of the pitch loop."""
     roll_crossover_rad_s: float = 2.5
@@ -35,6 +39,8 @@ class HoverAutopilotCfg(AutopilotCfg):
 
     design: HoverDesignCfg = HoverDesignCfg()
     """What the loops shall achieve."""
+    current_time_constant_s: float = 0.4
+    """Smoothing of the measured water velocity: gusts are fed forward as soon as the DVL's noise allows."""
     sway_acceleration_m_s2: float = 0.25
     """Fastest change of the sway and heave references: a descent must be stopped within decimetres."""
 

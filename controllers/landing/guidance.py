@@ -18,7 +18,7 @@ Flat = tuple[float, float]
 class LandingGuidanceCfg:
     """Speeds, corridor and station keeping; all values are ours."""
 
-    position_gain_1_s: float = 0.4
+    position_gain_1_s: float = 0.7
     """Station keeping: speed per metre of offset, a third of the velocity loops' crossover."""
     integral_gain_1_s2: float = 0.01
     """Station keeping: speed per metre and second of offset, against what the velocity loops leave of the current."""

@@ -11,15 +11,16 @@ from auvdock.controllers.autopilot import Autopilot, AutopilotSetpoint
 from auvdock.controllers.landing.config import LandingControlCfg
 from auvdock.controllers.landing.guidance import Flat, Place, corridor_m, station_keeping
 from auvdock.controllers.landing.modes import ABORT, DESCEND, DOCKED, SEARCH, TOUCHDOWN, LandingFacts, next_landing_mode
-from auvdock.controllers.landing.state import LandingState, LandingView
+from auvdock.controllers.landing.state import LandingState
 from auvdock.controllers.landing.steering import Demand, Situation, demand
 from auvdock.controllers.relative_state import RelativeFilter, RelativeState
 from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of, turn
 from auvdock.core.camera import Camera
-from auvdock.core.contracts import Bearing, Command, Proprioception
+from auvdock.core.contracts import Bearing, Command, Percept, Proprioception
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.marine import flip_vector
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.perception.landing.pipeline import LandingPercept
 
 __all__ = ["LandingPilot"]
 
@@ -88,9 +89,9 @@ class LandingPilot:
         )
 
     def step(
-        self, state: LandingState, percept: LandingView | None, proprioception: Proprioception
+        self, state: LandingState, percept: Percept | None, proprioception: Proprioception
     ) -> tuple[Command, LandingState]:
-        """One control period: estimate, judge the mode, steer, allocate."""
+        """One control period: estimate, judge the mode, steer, allocate; `percept` should be a `LandingPercept`."""
         senses = read_senses(proprioception)
         if state.since_s is None:
             height = self._height_by_pressure(senses)
@@ -111,7 +112,7 @@ class LandingPilot:
         clear = height > self.cfg.modes.standoff_m - 0.1 or now.in_mode_s > self.cfg.modes.abort_timeout_s
         return self._act(state, wanted, place, senses, state.giving_up and mode == ABORT and clear)
 
-    def _reckon(self, state: LandingState, percept: LandingView | None, senses: Senses) -> LandingState:
+    def _reckon(self, state: LandingState, percept: Percept | None, senses: Senses) -> LandingState:
         """Dead reckoning and, with a measured pose, the relative state after this period."""
         pose = percept.pose if percept is not None and percept.pose is not None and percept.pose.measured else None
         relative = state.relative
@@ -123,11 +124,11 @@ class LandingPilot:
                 relative = self._filter.update_pose(relative, senses, pose)
         east, north, _ = rotate(turn(senses.level, senses.yaw_rad), senses.ground_m_s)
         track = state.track_m[0] + east * self._dt_s, state.track_m[1] + north * self._dt_s
-        return state._replace(
-            relative=relative, track_m=track, lost=percept.status == "lost" if percept is not None else state.lost
-        )
+        # A perception that does not say how it fares is not lost: the age of its last pose decides alone.
+        lost = percept.status == "lost" if isinstance(percept, LandingPercept) else percept is None and state.lost
+        return state._replace(relative=relative, track_m=track, lost=lost)
 
-    def _look(self, state: LandingState, percept: LandingView | None, senses: Senses) -> LandingState:
+    def _look(self, state: LandingState, percept: Percept | None, senses: Senses) -> LandingState:
         """Remember where the station is: from the relative state, or from the direction to its lights."""
         bearing = percept.long_range if percept is not None else None
         if percept is not None:

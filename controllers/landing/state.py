@@ -1,34 +1,14 @@
-"""What the landing pilot remembers between two periods, and what it reads of perception."""
+"""What the landing pilot remembers between two periods."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from auvdock.controllers.autopilot import AutopilotState
 from auvdock.controllers.landing.guidance import Flat
 from auvdock.controllers.relative_state import RelativeState
-from auvdock.core.contracts import Bearing, PoseEstimate
 
-__all__ = ["LandingState", "LandingView"]
-
-
-class LandingView(Protocol):
-    """The part of a landing percept that the pilot reads."""
-
-    @property
-    def pose(self) -> PoseEstimate | None:
-        """Filtered pose of the belly camera; check `measured`."""
-        ...
-
-    @property
-    def long_range(self) -> Bearing | None:
-        """Direction to the group of lights."""
-        ...
-
-    @property
-    def status(self) -> str:
-        """One of "searching", "tracking", "holding" and "lost"."""
-        ...
+__all__ = ["LandingState"]
 
 
 class LandingState(NamedTuple):

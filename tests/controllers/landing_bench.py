@@ -14,10 +14,11 @@ from hover_bench import DT_S, VEHICLES, Hoverer
 from auvdock.controllers.landing.config import LandingControlCfg
 from auvdock.controllers.landing.pilot import LandingPilot
 from auvdock.core.camera import CameraCfg, make_camera
-from auvdock.core.contracts import Bearing, PoseEstimate
+from auvdock.core.contracts import Bearing, Detections, PoseEstimate
 from auvdock.core.landing_station import load_landing_station
 from auvdock.core.marine import flip_vector
 from auvdock.core.transforms import invert, make_transform
+from auvdock.perception.landing.pipeline import LandingPercept
 
 STATION = load_landing_station()
 STATION_WORLD_M = np.array([30.0, 0.0, -STATION.depth_m])
@@ -31,16 +32,12 @@ PILOTS = {
 }
 
 
-@dataclasses.dataclass(frozen=True)
-class Glance:
-    """What the pilot reads of a landing percept."""
-
-    pose: PoseEstimate | None
-    long_range: Bearing | None
-    status: str
+def glance_of(pose, long_range, status):
+    """A percept with what the pilot reads of it."""
+    return LandingPercept(0.0, pose, long_range, None, 0, Detections.empty(), status=status)
 
 
-BLIND = Glance(None, None, "searching")
+BLIND = glance_of(None, None, "searching")
 
 
 def look(name, T_world_body, rng=None):
@@ -71,7 +68,7 @@ def look(name, T_world_body, rng=None):
     if lit.any():
         ray = lights[lit].mean(axis=0)
         bearing = Bearing(ray / np.linalg.norm(ray), np.zeros(2), 0.9)
-    return Glance(pose, bearing, "tracking" if pose is not None else "searching")
+    return glance_of(pose, bearing, "tracking" if pose is not None else "searching")
 
 
 class Lander(Hoverer):

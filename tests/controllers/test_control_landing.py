@@ -11,7 +11,7 @@ import pytest
 from hover_bench import DT_S, VEHICLES
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from landing_bench import BLIND, CAMERAS, PILOTS, STATION, Glance, Lander, fly, look
+from landing_bench import BLIND, CAMERAS, PILOTS, STATION, Lander, fly, glance_of, look
 
 from auvdock.controllers.landing.config import HoverAllocationCfg, LandingControlCfg
 from auvdock.controllers.landing.guidance import LandingGuidanceCfg, Place, corridor_m, sink_m_s, station_keeping
@@ -101,7 +101,7 @@ def test_station_lost_for_good_ends_the_descent_and_the_attempt(status):
     def spoil(glance, lander):
         if lost_at or lander.offset()[2] < 1.2:
             lost_at.append(lander.offset()[2])
-            return Glance(None, None, status)
+            return glance_of(None, None, status)
         return glance
 
     commands = [command for _, _, command in fly(lander, 200.0, spoil, pilot=HASTY["bluerov2_heavy"])]
@@ -118,7 +118,7 @@ def test_without_a_pose_it_never_goes_low(name):
     heights, modes = [], []
 
     def spoil(glance, _):
-        return Glance(None, glance.long_range, "searching")
+        return glance_of(None, glance.long_range, "searching")
 
     for offset, _, command in fly(lander, 400.0, spoil, pilot=HASTY[name]):
         heights.append(offset[2])
@@ -136,7 +136,7 @@ def test_committed_descent_ends_blind_but_not_from_higher_up():
         def spoil(glance, lander, limit=height, blind=blind):
             if blind or lander.offset()[2] < limit:
                 blind.append(True)
-                return Glance(None, None, "holding")
+                return glance_of(None, None, "holding")
             return glance
 
         for offset, _, _ in fly(lander, 60.0, spoil):
@@ -203,7 +203,9 @@ poses = st.none() | st.builds(
     st.sampled_from([0.0, 1e-6, 1e-2, 10.0, math.nan, math.inf]),
     st.booleans(),
 )
-glances = st.none() | st.builds(Glance, poses, bearings, st.sampled_from(["searching", "tracking", "holding", "lost"]))
+glances = st.none() | st.builds(
+    glance_of, poses, bearings, st.sampled_from(["searching", "tracking", "holding", "lost"])
+)
 steps = st.tuples(glances, vectors, vectors, vectors, vectors, st.sampled_from([0.05, 0.5, 5.0, 40.0]))
 
 
