@@ -157,18 +157,32 @@ class Candidates:
         """Forget all."""
         self.all = []
 
-    def update(self, spots: list[Spot], place: CameraPlace, kept: Candidate | None) -> dict[int, Candidate]:
-        """Give each spot to its candidate or make a new one; returns candidates by their spot's index.
+    def update(
+        self, spots: list[Spot], place: CameraPlace, kept: Candidate | None, lit: bool
+    ) -> tuple[dict[int, Candidate], list[int]]:
+        """Give each spot to its candidate or make a new one.
+
+        While the beacon is lit, the brightest spot near its direction is it: its centre wanders along the beam. New
+        spots beside it are parts of its halo and make no candidates.
 
         Args:
-            spots: lights of this frame.
+            spots: lights of this frame, brightest first.
             place: the camera's place and attitude.
-            kept: a candidate that is never dropped.
+            kept: the beacon's candidate, which is never dropped.
+            lit: the beacon is lit.
+
+        Returns:
+            Candidates by their spot's index, and the indices of the beacon's halo's parts.
         """
         cfg = self._cfg
         self._drop(place.time_s, kept)
         rays = [place.R_compass_camera @ spot.ray_camera for spot in spots]
-        owner = self._assign(rays, place.time_s)
+        near: list[int] = []
+        if kept is not None and lit:
+            limit = math.cos(math.radians(cfg.max_gate_deg))
+            near = [index for index, ray in enumerate(rays) if float(ray @ kept.ray_compass) >= limit]
+        owner = self._assign(rays, place.time_s, kept if near else None, near[0] if near else -1)
+        parts = [index for index in near if index not in owner]
         in_view = self._in_view(place)
         keep_s = 2.5 * self._turn_s
         by_candidate = {id(candidate): index for index, candidate in owner.items()}
@@ -181,16 +195,16 @@ class Candidates:
                 shared = self._nearest(candidate, rays)
                 candidate.share(place.time_s, None if shared is None else spots[shared], keep_s)
         for index, spot in enumerate(spots):
-            if index in owner or len(self.all) - len(owner) > 2 * cfg.max_candidates:
+            if index in owner or index in parts or len(self.all) - len(owner) > 2 * cfg.max_candidates:
                 continue
             candidate = Candidate(rays[index], place.time_s)
             candidate.add(place.time_s, spot, rays[index], keep_s)
             self.all.append(candidate)
             owner[index] = candidate
-        return owner
+        return owner, parts
 
-    def _assign(self, rays: list[Array], time_s: float) -> dict[int, Candidate]:
-        """Nearest pairs first, each candidate and each spot once."""
+    def _assign(self, rays: list[Array], time_s: float, beacon: Candidate | None, own: int) -> dict[int, Candidate]:
+        """The lit beacon's spot `own` to it, then nearest pairs first, each candidate and each spot once."""
         if not rays or not self.all:
             return {}
         directions = np.array([candidate.ray_compass for candidate in self.all])
@@ -200,6 +214,10 @@ class Candidates:
         gate = np.minimum(self._cfg.gate_deg + self._cfg.gate_rise_deg_s * since, self._cfg.max_gate_deg)
         gap = np.where(gap <= gate, gap, np.inf)
         owner: dict[int, Candidate] = {}
+        if beacon is not None:
+            owner[own] = beacon
+            gap[own, :] = np.inf
+            gap[:, [candidate is beacon for candidate in self.all]] = np.inf
         while np.isfinite(gap.min()):
             spot, row = np.unravel_index(int(gap.argmin()), gap.shape)
             owner[int(spot)] = self.all[int(row)]

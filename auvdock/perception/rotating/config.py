@@ -29,6 +29,8 @@ class ForwardBeaconCfg:
     """The same over the scatter of the steady light."""
     max_widening: float = 4.5
     """A pass wider than so many beams is none."""
+    min_frames: int = 2
+    """Frames in which a pass must be seen."""
     max_sigma_deg: float = 3.0
     """Greatest standard deviation of a pass's peak."""
     max_misfit: float = 0.08

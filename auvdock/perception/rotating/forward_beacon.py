@@ -70,23 +70,24 @@ class ForwardBeacon:
         if self._own is not None and self._estimate is not None:
             self._carry(self._own, self._estimate, place.place_m)
         spots = merge_spots(detections, self._camera, math.radians(self._cfg.merge_deg))
-        owner = self._candidates.update(spots, place, self._own)
+        lit = self._lit(place.time_s)
+        owner, parts = self._candidates.update(spots, place, self._own, lit)
         fix: AzimuthFix | None = None
         for candidate in self._candidates.all:
             new = self._finder.judge(candidate, place.time_s, self._motion, None)
             if new is not None and (found := self._take(candidate, new)) is not None:
                 fix = found
         self._mask = np.zeros(len(detections), dtype=np.bool_)
-        if self._own is not None and self._lit(place.time_s):
-            for index, candidate in owner.items():
-                if candidate is self._own:
-                    self._mask[list(spots[index].rows)] = True
+        if lit:
+            for index in [*parts, *(index for index, candidate in owner.items() if candidate is self._own)]:
+                self._mask[list(spots[index].rows)] = True
         return fix
 
     def _take(self, candidate: Candidate, new: Pass) -> AzimuthFix | None:
         """A pass of a candidate: the beacon's, or one more for its chain."""
         cfg, rate = self._cfg, self._beacon.rate_rev_s
-        if candidate is self._own:
+        candidate.ray_compass = new.ray_compass
+        if candidate is self._own or self._is_own(candidate, new):
             return self._own_pass(candidate, new)
         candidate.chain = chained(candidate.chain, new, rate, cfg)
         chain = candidate.chain
@@ -97,6 +98,22 @@ class ForwardBeacon:
         self._own, self._strange = candidate, 0
         self._sweeps = [self._sweep(entry) for entry in chain]
         return self._fix(candidate, new)
+
+    def _is_own(self, candidate: Candidate, new: Pass) -> bool:
+        """Whether a pass of another candidate is the beacon's after all; the beacon then goes by that candidate."""
+        own, estimate = self._own, self._estimate
+        if own is None or estimate is None:
+            return False
+        if float(new.ray_compass @ own.ray_compass) < math.cos(math.radians(self._cfg.max_gate_deg)):
+            return False
+        ratio = new.amplitude / max(self._own_amplitude(), 1e-300)
+        gap = abs(wrap_angle(self._beacon.azimuth_rad(new.time_s) - self._expected_azimuth(estimate, new.place_m)))
+        since = (new.time_s - self._sweeps[-1].time_s) * self._beacon.rate_rev_s
+        if since < 0.5 or ratio < 1.0 / self._cfg.amplitude_ratio or gap > math.radians(self._cfg.coherence_deg):
+            return False
+        candidate.chain = own.chain
+        self._own = candidate
+        return True
 
     def _own_pass(self, candidate: Candidate, new: Pass) -> AzimuthFix | None:
         sweep = self._sweep(new)

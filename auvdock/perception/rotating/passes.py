@@ -113,8 +113,11 @@ class PassFinder:
     ) -> Pass | None:
         cfg = self._cfg
         near = np.abs(times - times[peak]) <= self._window_s
+        near &= (seen & (excess > 0.0)) | _outside(seen)
         rows = np.flatnonzero(near)
-        excess, seen = excess[rows], seen[rows] & (excess[rows] > 0.0)
+        excess, seen = excess[rows], seen[rows]
+        if int(seen.sum()) < cfg.min_frames:
+            return None
         height = float(excess.max())
         least = float(excess[seen].min())
         data = np.where(seen, excess, least)
@@ -156,6 +159,17 @@ class PassFinder:
             covered=covered,
             score=score / float(weight.sum()),
         )
+
+
+def _outside(seen: BoolArray) -> BoolArray:
+    """(n,) samples before the first and after the last in which the light was seen.
+
+    A frame between them without the light was not dark: the detector lost it in its own glare.
+    """
+    rows = np.flatnonzero(seen)
+    outside = np.ones(len(seen), dtype=np.bool_)
+    outside[rows[0] : rows[-1] + 1] = False
+    return outside
 
 
 def chained(chain: list[Pass], new: Pass, rate_rev_s: float, cfg: ForwardBeaconCfg) -> list[Pass]:
