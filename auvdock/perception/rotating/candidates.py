@@ -15,6 +15,9 @@ from auvdock.perception.rotating.motion import CameraPlace
 
 __all__ = ["Candidate", "Candidates", "Pass", "Spot", "merge_spots"]
 
+_KNOWN = 20
+"""Frames that make a light known (ours): more than a flash and its halo's parts last."""
+
 
 @dataclass(frozen=True, eq=False)
 class Spot:
@@ -109,10 +112,11 @@ class Candidate:
             del self.times_s[:cut], self.flux[:cut], self.seen[:cut], self.rays[:cut], self.scores[:cut]
 
 
-def merge_spots(detections: Detections, camera: Camera, merge_rad: float) -> list[Spot]:
+def merge_spots(detections: Detections, camera: Camera, cfg: ForwardBeaconCfg) -> list[Spot]:
     """Lights of a frame, brightest first.
 
-    Detections within `merge_rad` of a brighter one are the same light; its direction is their mean, weighted by flux.
+    Detections within `merge_deg` of a brighter one are the same light; its direction is their mean, weighted by flux.
+    Much dimmer ones within `glare_deg` are parts of its halo and left out: they flash with it.
     Without flux, brightness comes from the score: (s / (1 - s))² goes with light in a code that is the root of it, for
     one exposure only.
     """
@@ -123,14 +127,16 @@ def merge_spots(detections: Detections, camera: Camera, merge_rad: float) -> lis
     if flux is None:
         score = np.clip(detections.score, 0.0, 0.999)
         flux = (score / (1.0 - score)) ** 2
-    cosine = math.cos(merge_rad)
+    close, glare = math.cos(math.radians(cfg.merge_deg)), math.cos(math.radians(cfg.glare_deg))
     free = np.ones(len(rays), dtype=np.bool_)
     spots: list[Spot] = []
     for first in np.argsort(-flux, kind="stable"):
         if not free[first]:
             continue
-        rows = np.flatnonzero(free & (rays @ rays[first] >= cosine))
+        cosine = rays @ rays[first]
+        rows = np.flatnonzero(free & (cosine >= close))
         free[rows] = False
+        free &= (cosine < glare) | (flux * cfg.glare_ratio > flux[first])
         ray = (flux[rows] + 1e-12) @ rays[rows]
         norm = float(np.linalg.norm(ray))
         ray = ray / norm if norm > 0.0 else rays[first]
@@ -150,6 +156,7 @@ class Candidates:
             turn_s: duration of a turn of the beacon.
         """
         self._cfg, self._camera, self._turn_s = cfg, camera, turn_s
+        self._gate_cosine = math.cos(math.radians(cfg.gate_deg))
         self._merge_cosine = math.cos(math.radians(cfg.merge_deg))
         self.all: list[Candidate] = []
 
@@ -180,7 +187,11 @@ class Candidates:
         near: list[int] = []
         if kept is not None and lit:
             limit = math.cos(math.radians(cfg.max_gate_deg))
-            near = [index for index, ray in enumerate(rays) if float(ray @ kept.ray_compass) >= limit]
+            near = [
+                index
+                for index, ray in enumerate(rays)
+                if (cosine := float(ray @ kept.ray_compass)) >= limit and not self._lamp(ray, cosine, kept)
+            ]
         owner = self._assign(rays, place.time_s, kept if near else None, near[0] if near else -1)
         parts = [index for index in near if index not in owner]
         in_view = self._in_view(place)
@@ -224,6 +235,11 @@ class Candidates:
             gap[spot, :] = np.inf
             gap[:, row] = np.inf
         return owner
+
+    def _lamp(self, ray: Array, cosine: float, beacon: Candidate) -> bool:
+        """Whether a spot is a light known from many frames, nearer to that than to the beacon."""
+        gate = max(cosine, self._gate_cosine)
+        return any(c is not beacon and c.hits >= _KNOWN and float(ray @ c.ray_compass) > gate for c in self.all)
 
     def _nearest(self, candidate: Candidate, rays: list[Array]) -> int | None:
         """The spot within the merging distance of a candidate that has none of its own."""

@@ -47,6 +47,10 @@ class ForwardBeaconCfg:
     """Limit of that."""
     merge_deg: float = 0.7
     """Detections closer than this are one light: a halo's parts, or the far lamp under the beacon."""
+    glare_deg: float = 4.0
+    """Detections this close to a light `glare_ratio` times as bright are parts of its halo."""
+    glare_ratio: float = 5.0
+    """See `glare_deg`."""
     max_candidates: int = 24
     """Lights that are followed at once."""
     flux_share: float = 0.04

@@ -69,7 +69,7 @@ class ForwardBeacon:
         place = self._motion.update(proprioception)
         if self._own is not None and self._estimate is not None:
             self._carry(self._own, self._estimate, place.place_m)
-        spots = merge_spots(detections, self._camera, math.radians(self._cfg.merge_deg))
+        spots = merge_spots(detections, self._camera, self._cfg)
         lit = self._lit(place.time_s)
         owner, parts = self._candidates.update(spots, place, self._own, lit)
         fix: AzimuthFix | None = None

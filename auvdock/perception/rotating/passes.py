@@ -40,6 +40,7 @@ class PassFinder:
         self._turn_s = 1.0 / rate_rev_s
         self._window_s = math.radians(cfg.window_deg) / self._omega
         self._settle_s = math.radians(cfg.settle_deg) / self._omega
+        self._frame_rad = self._omega / frame_rate_hz
         self._frames = frame_rate_hz * (self._turn_s - 2.0 * self._window_s)
 
     def judge(self, candidate: Candidate, now_s: float, motion: CameraMotion, expected_s: float | None) -> Pass | None:
@@ -113,7 +114,9 @@ class PassFinder:
     ) -> Pass | None:
         cfg = self._cfg
         near = np.abs(times - times[peak]) <= self._window_s
-        near &= (seen & (excess > 0.0)) | _outside(seen)
+        lost = ~seen & ~_outside(seen)
+        beside = bool(lost[max(peak - 1, 0) : peak + 2].any())
+        near &= ~lost & ((excess > 0.0) | ~seen)
         rows = np.flatnonzero(near)
         excess, seen = excess[rows], seen[rows]
         if int(seen.sum()) < cfg.min_frames:
@@ -129,7 +132,11 @@ class PassFinder:
         origin = float(times[peak])
         angle = self._omega * (times[rows] - origin)
         fit = fit_pass(angle, data, sigma, seen, self._beam_sigma_rad, prior)
-        if fit.sigma_rad > math.radians(cfg.max_sigma_deg):
+        sigma_rad = fit.sigma_rad
+        if beside:
+            # The frame that glare took may have been the brightest: anywhere within a frame.
+            sigma_rad = math.hypot(sigma_rad, self._frame_rad / math.sqrt(12.0))
+        if sigma_rad > math.radians(cfg.max_sigma_deg):
             return None
         if fit.widening > cfg.max_widening or abs(fit.offset_rad) > math.radians(cfg.settle_deg):
             return None
@@ -151,7 +158,7 @@ class PassFinder:
             return None
         return Pass(
             time_s=time_s,
-            sigma_rad=fit.sigma_rad,
+            sigma_rad=sigma_rad,
             amplitude=fit.amplitude,
             widening=fit.widening,
             ray_compass=ray / norm,
