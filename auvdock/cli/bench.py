@@ -45,6 +45,8 @@ def run(argv: Sequence[str], prog: str) -> int:
         ("state observation", _state_env),
         ("beacons", lambda: _episodes("beacons", args.episodes)),
         ("pixels", lambda: _episodes("pixels", args.episodes)),
+        ("rotating beacons", lambda: _episodes("beacons", args.episodes, "rotating")),
+        ("rotating pixels", lambda: _episodes("pixels", args.episodes, "rotating")),
     ]
     report: dict[str, Any] = {"cores": 1, "machine_cores": os.cpu_count()}
     shown = steps if args.json else track(steps, "measuring", console=Console(stderr=True), transient=True)
@@ -103,8 +105,8 @@ def _state_env() -> dict[str, Any]:
     return {"env_steps_per_s": 1.0 / step_s}
 
 
-def _episodes(fidelity: str, count: int) -> dict[str, Any]:
-    runner = EpisodeRunner(_cfg(fidelity))
+def _episodes(fidelity: str, count: int, station: str = "conical") -> dict[str, Any]:
+    runner = EpisodeRunner(_cfg(fidelity, station))
     clock = _StageClock()
     clock.attach(runner)
     factors: list[float] = []
@@ -151,8 +153,8 @@ class _StageClock:
         object.__setattr__(owner, method, timed)
 
 
-def _cfg(fidelity: str) -> EpisodeCfg:
-    return level_cfg(1).override({"world": {"fidelity": fidelity}})
+def _cfg(fidelity: str, station: str = "conical") -> EpisodeCfg:
+    return level_cfg(1, station).override({"world": {"fidelity": fidelity}})
 
 
 def _print(report: dict[str, Any]) -> None:
