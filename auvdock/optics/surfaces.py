@@ -26,6 +26,7 @@ __all__ = ["Surfaces"]
 _GLARE_M2 = 0.15**2
 """Closer to a lamp than this, its own core and halo outshine what it lights."""
 _GREATEST_RADIANCE = 1.0 / math.pi
+_BOUND_STEPS = 40
 
 
 class Surfaces:
@@ -74,6 +75,9 @@ class Surfaces:
         nearest = np.array([self._geoms.distance_m(lamp) for lamp in self._lamps]).T
         loss = np.exp(-self._lamp_absorption * nearest) / np.maximum(nearest**2, _GLARE_M2)
         self._lamp_irradiance = loss @ self._spill_w_sr
+        # A vehicle that looks for a rotating beacon is far from the lamps for long, and the floor below it is dark.
+        self._planes = self._geoms.planes if lit.rotating is not None else np.zeros(0, dtype=np.int64)
+        self._lamp_to_plane = nearest[self._planes]
 
     def close(self) -> None:
         """Free OpenGL's context."""
@@ -87,10 +91,34 @@ class Surfaces:
         if self._lit.lamp is not None:
             irradiance = irradiance + self._lit.lamp.brightest(self._geoms.distance_m(position_world_m))
         radiance = irradiance * through * _GREATEST_RADIANCE
+        if len(self._planes):
+            radiance[self._planes] = self._plane_radiance(position_world_m, daylight, through[self._planes])
         per_pixel = self._lit.electrons_per_j.T * (sensitivity_s * self._lit.lens.rad_per_px**2)
         signal = float((radiance @ per_pixel).max(initial=0.0))
         veil = float(self._lit.veil_e_s(-float(position_world_m[2])).max()) * sensitivity_s
         return signal > math.sqrt(self._lit.cfg.read_noise_e**2 + veil)
+
+    def _plane_radiance(self, position_world_m: Array, daylight: Array, through: Array) -> Array:
+        """(n, 3) upper bound of each plane's radiance through water, tighter than that of its nearest point.
+
+        A point at d from a lamp lies D - d from the camera or farther, D being the camera's distance from that lamp, so
+        that its light has come a way of D at least: max over d of E(d) e^{-β max(D - d, h)}, in steps of d in which
+        each factor is taken at the end where it is greater; h is the camera's distance from the plane.
+        """
+        away = np.linalg.norm(self._lamps - position_world_m, axis=1)
+        height = self._geoms.distance_m(position_world_m)[self._planes]
+        bound = np.empty((len(self._planes), 3))
+        for row, nearest in enumerate(self._lamp_to_plane):
+            share = np.linspace(0.0, 1.0, _BOUND_STEPS + 1)
+            d = nearest[:, None] + np.maximum(away - nearest, 0.0)[:, None] * share
+            light = np.exp(-self._lamp_absorption[:, None] * d[:, :-1]) / np.maximum(d[:, :-1] ** 2, _GLARE_M2)
+            way = np.maximum(away[:, None] - d[:, 1:], height[row])
+            seen = (light[:, :, None] * np.exp(-self._beta_direct * way[:, :, None])).max(axis=1)
+            bound[row] = (seen * self._spill_w_sr).sum(axis=0)
+        irradiance = bound + daylight * through
+        if self._lit.lamp is not None:
+            irradiance = irradiance + self._lit.lamp.brightest(height) * through
+        return irradiance * _GREATEST_RADIANCE
 
     def electrons(self, T_world_camera: Array, exposure_s: float) -> NDArray[np.float32]:
         """Electrons (h, w, 3) per image pixel, red, green, blue, at this resolution.
@@ -172,6 +200,8 @@ class _Geoms:
         size[plane] = np.where(size[plane] > 0.0, size[plane], 1e6) * (1.0, 1.0, 0.0)
         self._round = np.where(plane | box, 0.0, np.array(model.geom_rbound)[index])
         size[~(plane | box)] = 0.0
+        self.planes = np.flatnonzero(plane)
+        """Indices of the planes among the geoms."""
         self._size = size
 
     def distance_m(self, point: Array) -> Array:

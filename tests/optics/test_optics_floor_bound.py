@@ -1,0 +1,46 @@
+"""The floor far from the station is not drawn where none of its lamps shows on it: the bound is one, and tight."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from auvdock.envs.config import rotating_world_cfg
+from auvdock.envs.world import DockingWorld
+
+
+@pytest.fixture(scope="module")
+def surfaces():
+    world = DockingWorld(dataclasses.replace(rotating_world_cfg(), fidelity="pixels"))
+    found = world.imager._surfaces
+    assert found is not None
+    return found
+
+
+def brightest_floor(unit, camera, floor_z):
+    """Greatest radiance per band that reaches the camera from points of the floor, lamp by lamp, on a fine grid."""
+    x, y = np.meshgrid(np.linspace(-12.0, 50.0, 249), np.linspace(-12.0, 12.0, 97))
+    points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, floor_z)])
+    d = np.linalg.norm(points[:, None] - unit._lamps, axis=2)
+    light = (np.exp(-d * unit._lamp_absorption) / d**2) @ unit._spill_w_sr
+    through = np.exp(-np.linalg.norm(points - camera, axis=1)[:, None] * unit._beta_direct)
+    return (light * through).max(axis=0) / math.pi
+
+
+@pytest.mark.parametrize("x_m", [3.0, 8.0, 15.0, 25.0, 40.0])
+@pytest.mark.parametrize("height_m", [1.0, 4.0])
+def test_no_point_of_the_floor_outshines_the_bound(surfaces, x_m, height_m):
+    floor_z = -12.0
+    camera = np.array([x_m, 1.0, floor_z + height_m])
+    through = np.exp(-height_m * surfaces._beta_direct)[None]
+    bound = surfaces._plane_radiance(camera, np.zeros(3), through)[0]
+    true = brightest_floor(surfaces, camera, floor_z)
+    lit = true > 0.0
+    assert np.all(bound[lit] >= 0.999 * true[lit])
+    assert np.all(bound[lit] <= 20.0 * true[lit])  # the sum over lamps of each one's best place, and the ladder's steps
+
+
+def test_far_from_the_station_nothing_is_drawn_and_near_it_is(surfaces):
+    assert not surfaces.visible(np.array([40.0, 0.0, -8.0]), 0.02)
+    assert surfaces.visible(np.array([5.0, 0.0, -8.0]), 0.02)
