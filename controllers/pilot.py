@@ -78,6 +78,8 @@ class ControlCfg:
     """Mode machine."""
     rotating: RotatingControlCfg = field(default_factory=RotatingControlCfg)
     """The way to the cone before the mouth, by a rotating beacon."""
+    controller: str = "own"
+    """"own", the station's pilot, or a pilot of yours as "package.module:Name" (`auvdock.controllers.named`)."""
 
 
 class PilotState(NamedTuple):

@@ -35,12 +35,16 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "start_heading": ("world.start.heading_deg",),
     "detector": ("perception.detector",),
     "association": ("perception.association",),
+    "controller": ("control.controller",),
     "fidelity": ("world.fidelity",),
 }
 """Short names of axes and the episode's settings that each sets; any other dotted setting is its own name."""
 
 DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 """`normal` has 95 % of its mass between low and high and is cut off there."""
+
+_NAMED = ("detector", "controller", "perception.detector", "control.controller")
+"""Axes whose values are names: a colon in them is that of "package.module:Name", not of a range."""
 
 _TAIL = 0.025
 
@@ -149,7 +153,7 @@ def parse_axis(name: str, text: str) -> AxisCfg:
     """
     remedy = "low:high:count, low:high, or values with commas between them"
     parts = text.split(":")
-    if len(parts) == 1:
+    if len(parts) == 1 or name in _NAMED:
         return AxisCfg(name, tuple(_value(part.strip(), name, remedy) for part in text.split(",")))
     if len(parts) > 3:
         raise ConfigError(name, text, remedy)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -21,6 +21,8 @@ __all__ = ["CampaignObserver", "CampaignSummary", "Tally", "run_campaign"]
 
 ROUND_EPISODES = 100
 """With `until_ci`, episodes between two looks at the interval (or a whole grid, if that is more)."""
+CELL_EPISODES = 20
+"""With `until_ci_per_cell`, a cell's episodes between two looks at its interval."""
 CRASHES = 10
 """If this many episodes have ended and all of them crashed, the campaign stops."""
 
@@ -87,7 +89,8 @@ def run_campaign(
 
     With `until_ci` the campaign goes on in rounds and stops after the first round whose prefix of episodes has an
     interval narrow enough (the fixed-width sequential interval of Chow and Robbins 1965). Rounds end before the next
-    one begins, so the episodes that are run do not depend on the number of workers.
+    one begins, so the episodes that are run do not depend on the number of workers. With `until_ci_per_cell` each cell
+    of the grid stops by its own episodes alone, looked at after every `CELL_EPISODES` of them.
 
     Raises:
         CampaignError: the store cannot be written, workers do not start, or all first episodes crash.
@@ -134,10 +137,13 @@ def run_campaign(
     )
 
 
-def _rounds(plan: Plan, outcomes: dict[int, bool]) -> Iterator[range]:
-    """Ranges of episodes, each to be finished before the next is asked for."""
+def _rounds(plan: Plan, outcomes: dict[int, bool]) -> Iterator[Sequence[int]]:
+    """Episodes by rounds, each to be finished before the next is asked for."""
     if not plan.cfg.until_ci:
         yield range(len(plan))
+        return
+    if plan.cfg.until_ci_per_cell:
+        yield from _rounds_by_cell(plan, outcomes)
         return
     step = max(ROUND_EPISODES, plan.cells)
     successes = 0
@@ -146,4 +152,23 @@ def _rounds(plan: Plan, outcomes: dict[int, bool]) -> Iterator[range]:
         yield range(start, end)
         successes += sum(outcomes[episode] for episode in range(start, end))
         if wilson(successes, end).half_width <= plan.cfg.until_ci:
+            return
+
+
+def _rounds_by_cell(plan: Plan, outcomes: dict[int, bool]) -> Iterator[Sequence[int]]:
+    """Rounds in which every cell of the grid runs its next episodes until its own interval is narrow enough.
+
+    Episode i lies in cell i mod (number of cells); a cell has its share of the plan's episodes, never other cells'.
+    """
+    successes = dict.fromkeys(range(plan.cells), 0)
+    for first in range(0, -(-len(plan) // plan.cells), CELL_EPISODES):
+        last = first + CELL_EPISODES
+        visited = [visit * plan.cells + cell for visit in range(first, last) for cell in successes]
+        episodes = [episode for episode in visited if episode < len(plan)]
+        yield episodes
+        for episode in episodes:
+            successes[episode % plan.cells] += outcomes[episode]
+        wide = {cell for cell, count in successes.items() if wilson(count, last).half_width > plan.cfg.until_ci}
+        successes = {cell: count for cell, count in successes.items() if cell in wide}
+        if not successes:
             return

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from auvdock.campaign.axes import AxisCfg
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import from_mapping, load_toml
-from auvdock.episode.config import LEVELS, EpisodeCfg, level_cfg
+from auvdock.episode.config import LEVELS, AnyEpisodeCfg, landing_level_cfg, level_cfg
 
 __all__ = ["SAMPLINGS", "STATIONS", "CampaignCfg", "campaign_from_plain", "load_campaign"]
 
 SAMPLINGS = ("random", "latin_hypercube", "sobol")
 """How axes that are distributions are drawn."""
-STATIONS = ("conical",)
-"""Stations that campaigns can dock into."""
+STATIONS: Mapping[str, Callable[[int], AnyEpisodeCfg]] = {
+    "conical": level_cfg,
+    "rotating": partial(level_cfg, station="rotating"),
+    "landing": landing_level_cfg,
+}
+"""Stations that campaigns can dock into, and what an episode of a difficulty level is there."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,8 @@ class CampaignCfg:
     """How drawn axes are sampled: "random", "latin_hypercube" or "sobol"."""
     until_ci: float = 0.0
     """Stop once the success rate's 95 % interval is no wider than plus or minus this; 0 runs all episodes."""
+    until_ci_per_cell: bool = False
+    """With `until_ci`: every cell of the grid goes on until its own interval is narrow enough."""
     episode_limit_s: float = 600.0
     """Wall-clock limit of one episode; past it the episode counts as `hung`."""
     axes: tuple[AxisCfg, ...] = ()
@@ -56,6 +63,8 @@ class CampaignCfg:
                 raise ConfigError(name, getattr(self, name), f"a whole number of {least} or more")
         if not 0.0 <= self.until_ci < 0.5:
             raise ConfigError("until_ci", self.until_ci, "half an interval's width, above 0 and below 0.5, or 0")
+        if self.until_ci_per_cell and not self.until_ci:
+            raise ConfigError("until_ci_per_cell", True, "until_ci beside it, the width that each cell is to reach")
         if not self.episode_limit_s > 0.0:
             raise ConfigError("episode_limit_s", self.episode_limit_s, "a time above 0 s")
         names = [axis.name for axis in self.axes]
@@ -69,13 +78,13 @@ class CampaignCfg:
                     raise ConfigError("axes.level", value, f"one of {', '.join(map(str, LEVELS))}")
                 base.override(axis.changes(value))
 
-    def base(self, level: int) -> EpisodeCfg:
+    def base(self, level: int) -> AnyEpisodeCfg:
         """What all episodes of a level share.
 
         Raises:
             ConfigError: no such level, or changes that do not fit.
         """
-        return level_cfg(level).override(self.episode)
+        return STATIONS[self.station](level).override(self.episode)
 
 
 def load_campaign(path: Path) -> CampaignCfg:

@@ -11,7 +11,7 @@ from auvdock.campaign.config import CampaignCfg
 from auvdock.campaign.plan import EpisodeSpec, Plan
 from auvdock.campaign.row import Row, lost_row, row_of
 from auvdock.core.errors import AuvdockError
-from auvdock.episode.config import EpisodeCfg
+from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.episode.runner import EpisodeRunner
 
 __all__ = ["DockingJob", "EpisodeFunction", "Job", "attempt"]
@@ -79,5 +79,5 @@ class _Docking:
         self._runners[key] = runner = self._make(self._plan.config(spec))
         return runner
 
-    def _make(self, cfg: EpisodeCfg) -> EpisodeRunner:
+    def _make(self, cfg: AnyEpisodeCfg) -> EpisodeRunner:
         return EpisodeRunner(cfg)

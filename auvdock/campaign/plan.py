@@ -13,7 +13,7 @@ from auvdock.campaign.axes import AxisValue
 from auvdock.campaign.config import CampaignCfg
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
-from auvdock.episode.config import EpisodeCfg
+from auvdock.episode.config import AnyEpisodeCfg
 
 __all__ = ["EpisodeSpec", "Plan"]
 
@@ -82,7 +82,7 @@ class Plan:
                 point[axis.name] = axis.quantile(float(probability))
         return EpisodeSpec(episode, seed, {axis.name: point[axis.name] for axis in self.cfg.axes})
 
-    def config(self, spec: EpisodeSpec) -> EpisodeCfg:
+    def config(self, spec: EpisodeSpec) -> AnyEpisodeCfg:
         """The episode's configuration."""
         level = spec.point.get("level", self.cfg.level)
         cfg = self.cfg.base(int(level))

@@ -9,7 +9,7 @@ from auvdock.campaign.plan import EpisodeSpec, Plan
 from auvdock.campaign.row import Row
 from auvdock.campaign.store import read_campaign, read_table
 from auvdock.core.errors import ConfigError
-from auvdock.episode.config import EpisodeCfg
+from auvdock.episode.config import AnyEpisodeCfg
 
 __all__ = ["StoredEpisode", "stored_episode"]
 
@@ -25,7 +25,7 @@ class StoredEpisode:
     """
 
     spec: EpisodeSpec
-    cfg: EpisodeCfg
+    cfg: AnyEpisodeCfg
     row: Row | None
 
 

@@ -45,6 +45,8 @@ class DockConical:
     where OpenGL works, else beacons."""
     detector: str | None = None
     """threshold, blob, or your own as package.module:Name."""
+    controller: str | None = None
+    """A pilot of your own as package.module:Name, in place of the station's."""
     water: str | None = None
     """Water preset: I, IA, IB, II, III, 1C to 9C, clear, pool, lake."""
     attenuation: float | None = None
@@ -90,6 +92,8 @@ class DockConical:
                 world.setdefault("sim", {}).setdefault("current", {})["direction_deg"] = degrees
         if self.detector is not None:
             changes["perception"] = {"detector": self.detector}
+        if self.controller is not None:
+            changes["control"] = {"controller": self.controller}
         return self.episode.override(changes).override(self.special())
 
     def special(self) -> dict[str, Any]:
@@ -149,6 +153,8 @@ def _defaults(
     command: type[DockConical], argv: Sequence[str], stored: StoredEpisode | None, station: str
 ) -> DockConical:
     if stored is not None:
+        if not isinstance(stored.cfg, EpisodeCfg):
+            raise ConfigError("from", stored.spec.episode, "an episode of a station that is seen by a bow camera")
         return command(seed=stored.spec.seed, episode=stored.cfg)
     return command() if {"-h", "--help"} & set(argv) else command(episode=base_config(argv, station))
 

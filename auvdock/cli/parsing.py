@@ -13,11 +13,12 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.strict import read_toml
 from auvdock.episode.config import EpisodeCfg, level_cfg
 
-__all__ = ["base_config", "parse"]
+__all__ = ["DEFAULT_LEVEL", "base_config", "level_and_file", "parse"]
 
 T = TypeVar("T")
 
 DEFAULT_LEVEL = 1
+"""Level of an episode that names none."""
 
 
 def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None) -> T:
@@ -36,6 +37,17 @@ def base_config(argv: Sequence[str], station: str = "conical") -> EpisodeCfg:
     Raises:
         ConfigError: no such level, or a file that does not fit.
     """
+    level, file = level_and_file(argv)
+    cfg = level_cfg(level, station)
+    return cfg.override(read_toml(file)) if file is not None else cfg
+
+
+def level_and_file(argv: Sequence[str]) -> tuple[int, Path | None]:
+    """What `--level N` and `--config FILE` say.
+
+    Raises:
+        ConfigError: a level that is no whole number.
+    """
     finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     finder.add_argument("--level", default=str(DEFAULT_LEVEL))
     finder.add_argument("--config", default=None)
@@ -44,5 +56,4 @@ def base_config(argv: Sequence[str], station: str = "conical") -> EpisodeCfg:
         level = int(found.level)
     except ValueError as error:
         raise ConfigError("level", found.level, "a whole number of 0 to 4") from error
-    cfg = level_cfg(level, station)
-    return cfg.override(read_toml(Path(found.config))) if found.config else cfg
+    return level, Path(found.config) if found.config else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import json
 import sys
@@ -16,18 +17,18 @@ from rich.table import Table
 
 from auvdock.campaign.axes import AxisCfg, parse_axis
 from auvdock.campaign.campaign import CampaignSummary, run_campaign
-from auvdock.campaign.config import CampaignCfg, load_campaign
+from auvdock.campaign.config import STATIONS, CampaignCfg, load_campaign
 from auvdock.campaign.executor import Executor, SerialExecutor
 from auvdock.campaign.job import DockingJob
 from auvdock.campaign.plan import Plan
 from auvdock.campaign.process import ProcessExecutor, usable_cores
 from auvdock.campaign.provenance import manifest_of
 from auvdock.campaign.store import Store, read_campaign
-from auvdock.cli.parsing import base_config, parse
+from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, parse
 from auvdock.cli.sweep_progress import SweepProgress
 from auvdock.core.errors import ConfigError
-from auvdock.core.strict import to_plain
-from auvdock.episode.config import EpisodeCfg, level_cfg
+from auvdock.core.strict import read_toml, to_plain
+from auvdock.episode.config import AnyEpisodeCfg, EpisodeCfg, LandingEpisodeCfg
 
 __all__ = ["Sweep", "run"]
 
@@ -40,12 +41,13 @@ AXIS_FLAGS = (
     "flicker",
     "interfering_lights",
     "detector",
+    "controller",
 )
 """Flags that may vary; `--axis` takes any other setting."""
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepFlags:
     """Run many episodes over a grid or a distribution of conditions, and store one row each.
 
     A range is low:high:count for a grid, low:high to draw from a distribution, or values with commas between them. Grid
@@ -58,8 +60,8 @@ class Sweep:
     """Folder of the campaign: manifest, rows as Parquet shards, later the report."""
     campaign: Path | None = None
     """Campaign as a TOML file (see experiments/campaigns); the flags below change single things of it."""
-    station: Literal["conical"] | None = None
-    """Docking station."""
+    station: Literal["conical", "rotating", "landing"] | None = None
+    """Docking station (conical if no campaign file says otherwise)."""
     episodes: int | None = None
     """Number of episodes (100 if no campaign file says otherwise)."""
     seed: int | None = None
@@ -74,6 +76,8 @@ class Sweep:
     """Go on with the campaign in --out; without other flags it is taken as it was begun."""
     until_ci: float | None = None
     """Stop once the success rate's 95 % interval is no wider than plus or minus this."""
+    until_ci_per_cell: bool = False
+    """With --until-ci, let every cell of the grid go on until its own interval is narrow enough."""
     sampling: Literal["random", "latin_hypercube", "sobol"] | None = None
     """How axes that are distributions are drawn."""
     episode_limit: float | None = None
@@ -100,11 +104,12 @@ class Sweep:
     """Lights that are not the station's: none, mild, moderate, severe, or several with commas."""
     detector: str | None = None
     """threshold, blob, your own as package.module:Name, or several with commas."""
+    controller: str | None = None
+    """own, a pilot of yours as package.module:Name, or several with commas."""
     axis: tuple[str, ...] = ()
     """Further axes as NAME=RANGE; a name is a short one or a dotted setting such as world.start.heading_deg."""
     config: Path | None = None
     """TOML file with further settings of the episodes, on top of the level."""
-    episode: Annotated[EpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=EpisodeCfg)
 
     def axes(self) -> list[AxisCfg]:
         """The axes that the flags ask for.
@@ -127,12 +132,31 @@ class Sweep:
         return found
 
 
+@dataclass(frozen=True)
+class Sweep(SweepFlags):
+    """Flags of a campaign whose stations are seen by a bow camera."""
+
+    __doc__ = SweepFlags.__doc__
+    episode: Annotated[EpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=EpisodeCfg)
+
+
+@dataclass(frozen=True)
+class SweepLanding(SweepFlags):
+    """Flags of a campaign of landings."""
+
+    __doc__ = SweepFlags.__doc__
+    episode: Annotated[LandingEpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=LandingEpisodeCfg)
+
+
 def run(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
-    asked_help = bool({"-h", "--help"} & set(argv))
-    base = EpisodeCfg() if asked_help else base_config(_single_level(argv))
-    args = parse(Sweep, argv, prog, dataclasses.replace(_defaults(), episode=base))
-    cfg = _resolve(args, base)
+    station = _station(argv)
+    base = _base(argv, station)
+    if isinstance(base, LandingEpisodeCfg):
+        args = parse(SweepLanding, argv, prog, SweepLanding(out=tyro.MISSING, episode=base))
+    else:
+        args = parse(Sweep, argv, prog, Sweep(out=tyro.MISSING, episode=base))
+    cfg = _resolve(args, args.episode, station)
     if args.workers is not None and args.workers < 1:
         raise ConfigError("workers", args.workers, "a whole number of 1 or more")
     Plan(cfg).config(Plan(cfg)[0])
@@ -149,8 +173,30 @@ def run(argv: Sequence[str], prog: str) -> int:
     return 0
 
 
-def _defaults() -> Sweep:
-    return Sweep(out=tyro.MISSING)
+def _station(argv: Sequence[str]) -> str:
+    """The station that decides which settings an episode has: by flag, campaign file, or the campaign to resume."""
+    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    for flag in ("--station", "--campaign", "--out"):
+        finder.add_argument(flag, default=None)
+    finder.add_argument("--resume", action="store_true")
+    found, _ = finder.parse_known_args(list(argv))
+    if found.station in STATIONS:
+        return found.station
+    if found.campaign is not None:
+        return load_campaign(Path(found.campaign)).station
+    if found.resume and found.out is not None:
+        return read_campaign(Path(found.out)).station
+    return CampaignCfg.station
+
+
+def _base(argv: Sequence[str], station: str) -> AnyEpisodeCfg:
+    """What `--level` and `--config` ask for; other flags change single fields of it."""
+    make = STATIONS[station]
+    if {"-h", "--help"} & set(argv):
+        return make(DEFAULT_LEVEL)
+    level, file = level_and_file(_single_level(argv))
+    cfg = make(level)
+    return cfg.override(read_toml(file)) if file is not None else cfg
 
 
 def _single_level(argv: Sequence[str]) -> list[str]:
@@ -164,8 +210,8 @@ def _single_level(argv: Sequence[str]) -> list[str]:
     return words
 
 
-def _resolve(args: Sweep, base: EpisodeCfg) -> CampaignCfg:
-    changes = _difference(to_plain(_start(args)), to_plain(args.episode))
+def _resolve(args: SweepFlags, episode: AnyEpisodeCfg, station: str) -> CampaignCfg:
+    changes = _difference(to_plain(_start(args, station)), to_plain(episode))
     axes = args.axes()
     if args.fidelity is not None:
         changes.setdefault("world", {})["fidelity"] = args.fidelity
@@ -176,6 +222,8 @@ def _resolve(args: Sweep, base: EpisodeCfg) -> CampaignCfg:
         for name in ("station", "episodes", "seed", "until_ci", "sampling")
         if getattr(args, name) is not None
     }
+    if args.until_ci_per_cell:
+        plain["until_ci_per_cell"] = True
     if args.episode_limit is not None:
         plain["episode_limit_s"] = args.episode_limit
     if args.level is not None and "," not in args.level:
@@ -190,9 +238,9 @@ def _resolve(args: Sweep, base: EpisodeCfg) -> CampaignCfg:
     return dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=_deep({**there.episode}, changes))
 
 
-def _start(args: Sweep) -> EpisodeCfg:
+def _start(args: SweepFlags, station: str) -> AnyEpisodeCfg:
     """What the flags' changes are relative to: the level that the campaign applies again to each episode."""
-    return level_cfg(int(args.level) if args.level is not None and "," not in args.level else 1)
+    return STATIONS[station](int(args.level) if args.level is not None and "," not in args.level else DEFAULT_LEVEL)
 
 
 def _difference(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
@@ -216,7 +264,7 @@ def _deep(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     return one
 
 
-def _executor(args: Sweep, cfg: CampaignCfg) -> Executor:
+def _executor(args: SweepFlags, cfg: CampaignCfg) -> Executor:
     if args.executor == "serial":
         return SerialExecutor(cfg.episode_limit_s)
     if args.executor == "ray":

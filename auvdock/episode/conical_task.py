@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from auvdock.controllers.named import make_named_pilot
 from auvdock.controllers.pilot import ConicalPilot, Pilot
 from auvdock.controllers.rotating.pilot import RotatingPilot
 from auvdock.core.contracts import Percept
@@ -12,6 +13,7 @@ from auvdock.envs.vehicle_world import Sensed
 from auvdock.envs.world import DockingWorld
 from auvdock.episode.config import EpisodeCfg
 from auvdock.episode.metrics import GuidanceMetrics
+from auvdock.episode.result import stage_of
 from auvdock.episode.rotating_metrics import RotatingMetrics
 from auvdock.episode.trace import Tick
 from auvdock.perception.detectors import make_station_detector
@@ -70,7 +72,7 @@ class ConicalTask:
 
     def stage(self, mode: str) -> str:
         """The failure reason of an episode that ends in a guidance mode."""
-        return _STAGES.get(mode, mode)
+        return stage_of(mode, _STAGES)
 
 
 class ConicalMetrics:
@@ -100,7 +102,11 @@ class ConicalMetrics:
 
 
 def make_pilot(cfg: EpisodeCfg, world: DockingWorld) -> Pilot[Any]:
-    """The rotating beacon's pilot if there is one or the station's heading is unknown, else the conical one."""
+    """The pilot that the settings name, or the station's own.
+
+    That is the rotating beacon's if there is one or the station's heading is unknown, else the conical one.
+    """
     found_anywhere = cfg.world.station.rotating is not None or cfg.world.station_heading == "unknown"
     kind = RotatingPilot if found_anywhere else ConicalPilot
-    return kind(cfg.control, world.simulator.vehicle, cfg.world.station, world.camera, 1.0 / cfg.world.control_hz)
+    vehicle, dt_s = world.simulator.vehicle, 1.0 / cfg.world.control_hz
+    return make_named_pilot(cfg.control.controller, kind, cfg.control, vehicle, cfg.world.station, world.camera, dt_s)

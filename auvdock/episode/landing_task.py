@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import cast
 
 from auvdock.controllers.landing.pilot import LandingPilot
-from auvdock.controllers.pilot import Pilot
+from auvdock.controllers.named import PilotFactory, make_named_pilot
 from auvdock.core.contracts import Percept
 from auvdock.envs.landing_world import LandingWorld
 from auvdock.envs.vehicle_world import Sensed
 from auvdock.episode.config import LandingEpisodeCfg
 from auvdock.episode.landing_metrics import LandingMetrics
+from auvdock.episode.result import stage_of
 from auvdock.perception.detectors import make_detector
 from auvdock.perception.landing.pipeline import LandingPerception
 from auvdock.perception.landing.tag_detectors import make_tag_detector
@@ -48,8 +49,9 @@ class LandingTask:
         vehicle, camera = self.world.simulator.vehicle, self.world.camera
         self._perception = LandingPerception(cfg.perception, camera, self.station)
         # It reads more of a percept than other pilots do; `perceive` gives it no other.
-        pilot = LandingPilot(cfg.control, vehicle, self.station, camera, 1.0 / cfg.world.control_hz)
-        self.pilot = cast(Pilot[Any], pilot)
+        own = cast(PilotFactory, LandingPilot)
+        dt_s = 1.0 / cfg.world.control_hz
+        self.pilot = make_named_pilot(cfg.control.controller, own, cfg.control, vehicle, self.station, camera, dt_s)
 
     def reset(self) -> None:
         """Forget the pose and its filter."""
@@ -72,4 +74,4 @@ class LandingTask:
 
     def stage(self, mode: str) -> str:
         """The failure reason of an episode that ends in a guidance mode."""
-        return _STAGES.get(mode, mode)
+        return stage_of(mode, _STAGES)

@@ -8,7 +8,7 @@ from typing import Any
 
 from auvdock.core.strict import to_plain
 
-__all__ = ["FAILURE_REASONS", "EpisodeResult"]
+__all__ = ["FAILURE_REASONS", "EpisodeResult", "stage_of"]
 
 FAILURE_REASONS = (
     "search",
@@ -33,6 +33,17 @@ vehicle's structure bears. `timeout`: time ran out while backing off for another
 state became absurd. `interrupted`: the user stopped it. In campaigns only, `hung`: it took longer than its wall-clock
 limit; `crashed`: it raised an exception or took its worker down.
 """
+
+
+def stage_of(mode: str, names: Mapping[str, str]) -> str:
+    """The failure reason of an episode that ends in a pilot's mode; modes that only the pilot knows are a `timeout`.
+
+    Args:
+        mode: the pilot's mode.
+        names: failure reasons of modes that have another name.
+    """
+    reason = names.get(mode, mode)
+    return reason if reason in FAILURE_REASONS else "timeout"
 
 
 @dataclass(frozen=True)

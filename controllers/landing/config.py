@@ -83,3 +83,5 @@ class LandingControlCfg:
     """Looking for the station."""
     modes: LandingModeCfg = LandingModeCfg()
     """Mode machine."""
+    controller: str = "own"
+    """"own", the package's pilot, or a pilot of yours as "package.module:Name" (`auvdock.controllers.named`)."""

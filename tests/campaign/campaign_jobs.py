@@ -42,6 +42,20 @@ class Bernoulli:
 
 
 @dataclass(frozen=True)
+class ByCell:
+    """Succeeds with the probability of its cell; cells follow one another."""
+
+    probabilities: tuple[float, ...]
+
+    def build(self):
+        def run(spec):
+            probability = self.probabilities[spec.episode % len(self.probabilities)]
+            return row(spec, bool(np.random.default_rng(spec.seed).random() < probability))
+
+        return run
+
+
+@dataclass(frozen=True)
 class Troubled:
     """Episode 1 kills its worker always, 2 only the first time, 3 hangs, 4 raises; the others succeed."""
 

@@ -1,7 +1,9 @@
 """Executors: the same rows everywhere; deaths, hangs and exceptions stay the episode's own."""
 
+import dataclasses
+
 import pytest
-from campaign_jobs import Bernoulli, Raising, Troubled
+from campaign_jobs import Bernoulli, ByCell, Raising, Troubled
 
 from auvdock.campaign.axes import AxisCfg
 from auvdock.campaign.campaign import Tally, run_campaign
@@ -12,6 +14,7 @@ from auvdock.campaign.job import DockingJob
 from auvdock.campaign.plan import Plan
 from auvdock.campaign.process import ProcessExecutor
 from auvdock.campaign.provenance import manifest_of
+from auvdock.campaign.statistics import wilson
 from auvdock.campaign.store import Store, read_table
 from auvdock.core.errors import ConfigError
 
@@ -132,3 +135,34 @@ def test_the_adaptive_stop_ends_at_the_first_prefix_that_is_known_well_enough(tm
     swept(tmp_path / "parts", interrupted, Bernoulli(probability), SerialExecutor(60.0))
     _, again = swept(tmp_path / "parts", cfg, Bernoulli(probability), SerialExecutor(60.0), resume=True)
     assert again == rows
+
+
+def test_cells_stop_one_by_one_and_the_same_in_any_number_of_workers_and_after_a_kill(tmp_path):
+    """Each cell stops at its own first look with a narrow interval: sure cells early, doubtful ones late or never."""
+    cfg = CampaignCfg(episodes=3000, until_ci=0.1, until_ci_per_cell=True, axes=(AxisCfg("current", (0.0, 0.25, 0.5)),))
+    job = ByCell((1.0, 0.9, 0.5))
+    summary, rows = swept(tmp_path / "whole", cfg, job, SerialExecutor(60.0))
+    cells = [[row["success"] for row in rows if row["current"] == value] for value in (0.0, 0.25, 0.5)]
+    for cell in cells:
+        assert len(cell) % 20 == 0
+        assert wilson(sum(cell), len(cell)).half_width <= 0.1
+        assert wilson(sum(cell[:-20]), len(cell) - 20).half_width > 0.1
+    assert len(cells[0]) < len(cells[1]) < len(cells[2])
+    assert summary.rate.episodes == len(rows) == sum(map(len, cells))
+    part = dataclasses.replace(cfg, episodes=100)
+    swept(tmp_path / "parts", part, job, SerialExecutor(60.0))
+    _, resumed = swept(tmp_path / "parts", cfg, job, SerialExecutor(60.0), resume=True)
+    assert resumed == rows
+    _, elsewhere = swept(tmp_path / "process", cfg, job, ProcessExecutor(2, 60.0))
+    assert elsewhere == rows
+
+
+def test_a_cell_gets_its_share_of_the_episodes_and_no_more(tmp_path):
+    cfg = CampaignCfg(episodes=50, until_ci=0.01, until_ci_per_cell=True, axes=(AxisCfg("current", (0.0, 0.5)),))
+    _, rows = swept(tmp_path, cfg, Bernoulli(0.5), SerialExecutor(60.0))
+    assert [row["episode"] for row in rows] == list(range(50))
+
+
+def test_cells_without_a_width_to_reach_are_refused():
+    with pytest.raises(ConfigError, match="until_ci"):
+        CampaignCfg(until_ci_per_cell=True)
