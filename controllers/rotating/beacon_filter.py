@@ -49,6 +49,9 @@ class BeaconFilterCfg:
     """Greatest squared Mahalanobis distance of an accepted fix: 99.99 % of χ² with 2 degrees of freedom."""
     restart_after: int = 4
     """So many refused fixes in a row start the bank anew: the estimate, not the fixes, is then wrong."""
+    finer: float = 0.4
+    """Two refused fixes in a row are enough if they are so much finer than the finest that the bank rests on: a few
+    dim frames at the edge of the beam make a coarse fix whose error is not random."""
     drop_weight: float = 1e-3
     """A hypothesis below this weight is dropped."""
 
@@ -109,6 +112,7 @@ class BeaconState(NamedTuple):
         depth_variance_m2: its variance.
         range_sigma_m: standard deviation along the line of sight as of the last fix.
         cross_sigma_m: standard deviation across it.
+        finest_rad: least standard deviation of the fixes that the bank rests on.
     """
 
     bank: tuple[Hypothesis, ...]
@@ -121,6 +125,7 @@ class BeaconState(NamedTuple):
     depth_variance_m2: float
     range_sigma_m: float = math.inf
     cross_sigma_m: float = math.inf
+    finest_rad: float = math.inf
 
     @property
     def offset_m(self) -> tuple[float, float]:
@@ -245,7 +250,8 @@ class BeaconFilter:
             nearest = min(nearest, distance)
             updated.append((log_chance, after))
         if nearest > cfg.gate:
-            if state.refused + 1 >= cfg.restart_after:
+            enough = 2 if sighting.sigma_rad < cfg.finer * state.finest_rad else cfg.restart_after
+            if state.refused + 1 >= enough:
                 fresh = self.start(sighting, state.restarts + 1)
                 if fresh is not None:
                     return fresh
@@ -260,7 +266,14 @@ class BeaconFilter:
             Hypothesis(chance / total, (h.mean[0] - late[0], h.mean[1] - late[1], h.mean[2]), h.covariance)
             for chance, h in kept
         )
-        after = state._replace(bank=bank, moved_m=(0.0, 0.0), since_fix_s=0.0, fixes=state.fixes + 1, refused=0)
+        after = state._replace(
+            bank=bank,
+            moved_m=(0.0, 0.0),
+            since_fix_s=0.0,
+            fixes=state.fixes + 1,
+            refused=0,
+            finest_rad=min(state.finest_rad, sighting.sigma_rad),
+        )
         return self._depth(_measured(after), sighting, since)
 
     def _depth(self, state: BeaconState, sighting: Sighting, since_s: float) -> BeaconState:
