@@ -31,8 +31,9 @@ class Hoverer:
         sensors=QUIET,
         seed=0,
         position_m=(30.0, 0.0, -4.0),
+        station=None,
     ):
-        self.simulator = Simulator(SimCfg(vehicle=name, sensors=sensors), load_conical_station())
+        self.simulator = Simulator(SimCfg(vehicle=name, sensors=sensors), station or load_conical_station())
         self.simulator.reset(
             np.array(position_m),
             quat_wxyz_from_euler_zyx(0.0, 0.0, yaw_rad),

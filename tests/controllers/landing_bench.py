@@ -1,6 +1,6 @@
-"""A bench for the landing pilot: either vehicle in open water, an ideal eye, and the latch's limits without guides.
+"""A bench for the landing pilot: either vehicle, an ideal eye, and the latch's limits without guides or the station.
 
-No guide helps and no platform stops the vehicle: it must come to the seat by itself.
+Without the station no guide helps and no platform stops the vehicle: it must come to the seat by itself.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from auvdock.core.transforms import invert, make_transform
 from auvdock.perception.landing.pipeline import LandingPercept
 
 STATION = load_landing_station()
-STATION_WORLD_M = np.array([30.0, 0.0, -STATION.depth_m])
+OPEN_WATER_M = np.array([30.0, 0.0, -STATION.depth_m])
 CAMERA_CFG = CameraCfg(800, 600, 20.0, 50.0, 38.6)
 CAMERAS = {
     name: make_camera(CAMERA_CFG, *(flip_vector(np.array(part)) for part in (m.position_m, m.direction, m.up)))
@@ -40,10 +40,10 @@ def glance_of(pose, long_range, status):
 BLIND = glance_of(None, None, "searching")
 
 
-def look(name, T_world_body, rng=None):
+def look(name, T_station_body, rng=None):
     """A pose if four lights or the whole tag are in the image, a bearing if any light is; 1 cm and 0.5° of noise."""
     camera = CAMERAS[name]
-    T_station_camera = make_transform(np.eye(3), -STATION_WORLD_M) @ T_world_body @ camera.T_body_camera
+    T_station_camera = T_station_body @ camera.T_body_camera
     T_camera_station = invert(T_station_camera)
 
     def seen(points):
@@ -72,26 +72,39 @@ def look(name, T_world_body, rng=None):
 
 
 class Lander(Hoverer):
-    """A vehicle above the station, which latches it when its seat is where the latch can reach it."""
+    """A vehicle above the place of a station, latched when its seat is where the latch could reach it.
 
-    def __init__(self, name, height_m=4.0, ahead_m=0.0, port_m=0.0, yaw_deg=0.0, **more):
+    With `solid` the station itself is there, with its own guides and latch.
+    """
+
+    def __init__(self, name, height_m=4.0, ahead_m=0.0, port_m=0.0, yaw_deg=0.0, solid=False, **more):
         self.name = name
+        self.solid = solid
+        self.station_m = np.array([0.0, 0.0, -STATION.depth_m]) if solid else OPEN_WATER_M
         self.vehicle = VEHICLES[name]
         self.seat_m = flip_vector(np.array(self.vehicle.seat_m))
         place = np.array([ahead_m, port_m, STATION.guide.seat_height_m + height_m])
-        super().__init__(name, math.radians(yaw_deg), position_m=STATION_WORLD_M + place - self.seat_m, **more)
+        more["station"] = STATION if solid else None
+        super().__init__(name, math.radians(yaw_deg), position_m=self.station_m + place - self.seat_m, **more)
         self.latched = False
         self.latch_works = True
         self.fastest_m_s = 0.0
 
+    @property
+    def T_station_body(self):
+        return make_transform(np.eye(3), -self.station_m) @ self.T_world_body
+
     def offset(self):
         """The seat from its place: ξ, η, ζ in m, and ψ in rad."""
-        T = self.T_world_body
-        seat = T[:3, :3] @ self.seat_m + T[:3, 3] - STATION_WORLD_M
+        T = self.T_station_body
+        seat = T[:3, :3] @ self.seat_m + T[:3, 3]
         return np.array([seat[0], seat[1], seat[2] - STATION.guide.seat_height_m, math.atan2(T[1, 0], T[0, 0])])
 
     def senses(self):
         senses = super().senses()
+        if self.solid:
+            self.latched = senses.latched
+            return senses
         latch = STATION.latch
         x, y, z, psi = self.offset()
         speed = float(np.linalg.norm(self.simulator.truth.nu_body[:3]))
@@ -114,7 +127,7 @@ def fly(lander, time_s, spoil=lambda glance, lander: glance, seed=1, pilot=None)
     state = pilot.initial_state()
     for _ in range(round(time_s / DT_S)):
         senses = lander.senses()
-        glance = spoil(look(lander.name, lander.T_world_body, rng), lander)
+        glance = spoil(look(lander.name, lander.T_station_body, rng), lander)
         command, state = pilot.step(state, glance, senses)
         yield lander.offset(), glance, command
         if command.mode == "docked" or command.giving_up:

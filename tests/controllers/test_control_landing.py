@@ -76,6 +76,23 @@ def test_docks_without_any_help_of_guides(name, height_m, ahead_m, port_m, yaw_d
     assert abs(math.degrees(lander.offset()[3])) < 2.0
 
 
+@pytest.mark.parametrize("name", PILOTS)
+def test_lands_softly_on_the_solid_station(name):
+    """The station's own latch closes and holds; first contact slower than 0.3 m/s, in a current of 0.3 m/s."""
+    lander = Lander(
+        name, 3.0, 0.7, -0.7, 25.0, solid=True, current_m_s=0.3, direction_deg=70.0, sensors=SensorCfg(), seed=5
+    )
+    commands = [command for _, _, command in fly(lander, 60.0)]
+    assert commands[-1].mode == "docked"
+    for _ in range(round(1.0 / DT_S)):
+        lander.step(commands[-1].values)
+    truth = lander.simulator.truth
+    assert truth.docked
+    assert truth.landing is not None
+    speed = truth.landing.touchdown_speed_m_s
+    assert speed is None or speed < 0.1
+
+
 def test_tag_occluded_for_two_seconds_at_one_metre_only_delays():
     """The descent goes on for a moment, stops, and goes on once the pose is back."""
     lander, hidden, flight = Lander("bluerov2_heavy", current_m_s=0.1, direction_deg=60.0), [], []
@@ -166,7 +183,7 @@ def test_same_input_gives_same_output_and_nothing_is_mutated():
     pilot, lander = PILOTS["bluerov2_heavy"], Lander("bluerov2_heavy", ahead_m=1.0)
     state = pilot.initial_state()
     for index in range(600):
-        senses, glance = lander.senses(), look("bluerov2_heavy", lander.T_world_body)
+        senses, glance = lander.senses(), look("bluerov2_heavy", lander.T_station_body)
         before, senses_before = copy.deepcopy(state), copy.deepcopy(senses)
         command, after = pilot.step(state, glance, senses)
         if index % 40 == 0:
