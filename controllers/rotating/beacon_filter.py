@@ -23,6 +23,10 @@ from auvdock.core.errors import ConfigError
 __all__ = ["BeaconFilter", "BeaconFilterCfg", "BeaconState", "Hypothesis", "Sighting"]
 
 
+_POSE_SIGMA_RAD = 0.02
+"""Standard deviation of the axis that the array's poses leave behind (ours)."""
+
+
 @dataclass(frozen=True)
 class BeaconFilterCfg:
     """Noise levels and ranges of the filter bank; all ours."""
@@ -212,19 +216,17 @@ class BeaconFilter:
         middle = sum(self._ranges) / len(self._ranges)
         depth = sighting.depth_m - middle * math.tan(sighting.elevation_rad)
         spread = 0.6 * middle * math.tan(sighting.elevation_rad)
-        return _measured(
-            BeaconState(
-                tuple(bank), (0.0, 0.0), 0.0, 1, 0, restarts, depth, spread**2 + (middle * cfg.elevation_floor_rad) ** 2
-            )
-        )
+        variance_m2 = spread**2 + (middle * cfg.elevation_floor_rad) ** 2
+        state = BeaconState(tuple(bank), (0.0, 0.0), 0.0, 1, 0, restarts, depth, variance_m2)
+        return _measured(state._replace(finest_rad=sighting.sigma_rad))
 
     def place(self, offset_m: tuple[float, float], axis_yaw_rad: float, depth_m: float, sigma_m: float) -> BeaconState:
         """A bank of one from a known place, as the array's poses give it; `sigma_m` is its standard deviation."""
-        covariance = np.diag([sigma_m**2, sigma_m**2, 0.02**2])
+        covariance = np.diag([sigma_m**2, sigma_m**2, _POSE_SIGMA_RAD**2])
         mean = (offset_m[0], offset_m[1], axis_yaw_rad)
-        return BeaconState(
-            (Hypothesis(1.0, mean, covariance),), (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2, sigma_m, sigma_m
-        )
+        bank = (Hypothesis(1.0, mean, covariance),)
+        state = BeaconState(bank, (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2, sigma_m, sigma_m)
+        return state._replace(finest_rad=_POSE_SIGMA_RAD)
 
     def predict(self, state: BeaconState, ground_compass_m_s: tuple[float, float]) -> BeaconState:
         """Dead reckoning over one control period with the velocity over ground in level compass axes."""
