@@ -9,11 +9,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvdock.core.station import ConicalStationCfg
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.trace import EpisodeSetup, Tick
 
 __all__ = ["ProgressDisplay", "print_result"]
 
+_Line = tuple[str, float | int | None, str]
+"""Name, value, format."""
 PLAIN_EVERY_S = 10.0
 """Simulated time between progress lines where the output is no terminal."""
 
@@ -21,10 +24,10 @@ PLAIN_EVERY_S = 10.0
 class ProgressDisplay:
     """A live line: distance made good, mode, range, speed. Plain lines where standard error is no terminal."""
 
-    def __init__(self, max_time_s: float) -> None:
+    def __init__(self) -> None:
         """Prepare; nothing is shown before the episode starts."""
         self._console = Console(stderr=True)
-        self._max_time_s = max_time_s
+        self._inside_m = 0.0
         self._progress: Progress | None = None
         self._start_range_m: float | None = None
         self._next_plain_s = 0.0
@@ -32,8 +35,11 @@ class ProgressDisplay:
 
     def on_start(self, setup: EpisodeSetup) -> None:
         """Show the title."""
-        # Starts all around may lie behind the station, where no way along the axis is left.
-        self._around = getattr(setup.station, "rotating", None) is not None
+        station = setup.station
+        if isinstance(station, ConicalStationCfg):
+            # Starts all around may lie behind the station, where no way along the axis is left.
+            self._around = station.rotating is not None
+            self._inside_m = station.funnel.length_m + station.latch.depth_m
         self._console.print(f"auvdock: {setup.title}, water {setup.water}, detector {setup.detector}")
         if self._console.is_terminal:
             columns = (TextColumn("{task.description}"), BarColumn(40), TimeElapsedColumn())
@@ -49,7 +55,7 @@ class ProgressDisplay:
         speed_m_s = math.hypot(*(float(part) for part in tick.truth.nu_body[:3]))
         line = f"t {tick.truth.time_s:5.1f} s  {tick.command.mode:8s} range {range_m:5.1f} m  {speed_m_s:4.2f} m/s"
         if self._progress is not None:
-            done = 1.0 - max(0.0, range_m + 1.7) / (self._start_range_m + 1.7)
+            done = 1.0 - max(0.0, range_m + self._inside_m) / (self._start_range_m + self._inside_m)
             self._progress.update(self._progress.task_ids[0], description=line, completed=max(0.0, done))
         elif tick.truth.time_s >= self._next_plain_s:
             self._next_plain_s += PLAIN_EVERY_S
@@ -73,19 +79,11 @@ def print_result(result: EpisodeResult, record: Path | None, title: str = "conic
     table.add_column("value", justify="right")
     verdict = "[green]docked[/green]" if result.success else f"[red]failed: {result.failure_reason}[/red]"
     table.add_row("outcome", verdict)
-    rows: list[tuple[str, float | int | None, str]] = [
+    rows: list[_Line] = [
         ("time", result.time_s, "{:.1f} s"),
         ("path length", result.path_length_m, "{:.1f} m"),
         ("thruster work", result.energy_j, "{:.0f} J"),
-        ("entry distance (first pose)", result.entry_distance_m, "{:.1f} m"),
-        ("precise-guidance range", result.precise_range_m, "{:.1f} m"),
-        ("precise frames", result.precise_frames, "{:d}"),
-        ("invalid frames", result.invalid_frames, "{:d}"),
-        ("distortion rate", _percent(result.distortion_rate), "{:.2f} %"),
-        ("median pose error", result.pose_error_median_m, "{:.3f} m"),
-        ("lateral error at entry", result.lateral_error_m, "{:+.3f} m"),
-        ("heading error at entry", _degrees(result.heading_error_rad), "{:.1f}°"),
-        ("entry speed", result.entry_speed_m_s, "{:.2f} m/s"),
+        *(_entry(result) if result.aligned_frames is None else _landing(result)),
         ("peak contact force", result.peak_contact_force_n, "{:.0f} N"),
         *_rotating_rows(result),
         ("approaches", result.attempts, "{:d}"),
@@ -111,6 +109,44 @@ def _rotating_rows(result: EpisodeResult) -> list[tuple[str, float | int | None,
         ("azimuth error (rms)", _degrees(result.azimuth_rms_rad), "{:.2f}°"),
         ("azimuth error at hand-over", _degrees(result.handover_azimuth_error_rad), "{:+.2f}°"),
     ]
+
+
+def _entry(result: EpisodeResult) -> list[_Line]:
+    return [
+        ("entry distance (first pose)", result.entry_distance_m, "{:.1f} m"),
+        ("precise-guidance range", result.precise_range_m, "{:.1f} m"),
+        ("precise frames", result.precise_frames, "{:d}"),
+        ("invalid frames", result.invalid_frames, "{:d}"),
+        ("distortion rate", _percent(result.distortion_rate), "{:.2f} %"),
+        ("median pose error", result.pose_error_median_m, "{:.3f} m"),
+        ("lateral error at entry", result.lateral_error_m, "{:+.3f} m"),
+        ("heading error at entry", _degrees(result.heading_error_rad), "{:.1f}°"),
+        ("entry speed", result.entry_speed_m_s, "{:.2f} m/s"),
+    ]
+
+
+def _landing(result: EpisodeResult) -> list[_Line]:
+    return [
+        ("range of the first pose", result.entry_distance_m, "{:.1f} m"),
+        ("frames by lights alone", _percent(result.lights_share), "{:.1f} %"),
+        ("frames by the tag alone", _percent(result.tag_share), "{:.1f} %"),
+        ("frames by both", _percent(result.fused_share), "{:.1f} %"),
+        ("frames by neither", _percent(result.blind_share), "{:.1f} %"),
+        ("position error at the latch", _millimetres(result.final_position_error_m), "{:.1f} mm"),
+        ("greatest after alignment", _millimetres(result.max_position_error_m), "{:.1f} mm"),
+        ("heading error at the latch", _degrees(result.final_heading_error_rad), "{:.2f}°"),
+        ("greatest after alignment", _degrees(result.max_heading_error_rad), "{:.2f}°"),
+        ("estimate's position error, 95 %", _millimetres(result.estimate_position_p95_m), "{:.1f} mm"),
+        ("estimate's heading error, 95 %", _degrees(result.estimate_heading_p95_rad), "{:.2f}°"),
+        ("estimates within 20 mm and 3°", _percent(result.estimate_within_20mm_3deg), "{:.1f} %"),
+        ("estimates within 10 mm and 1°", _percent(result.estimate_within_10mm_1deg), "{:.1f} %"),
+        ("touchdown speed", result.touchdown_speed_m_s, "{:.3f} m/s"),
+        ("touchdown force", result.touchdown_force_n, "{:.0f} N"),
+    ]
+
+
+def _millimetres(value_m: float | None) -> float | None:
+    return None if value_m is None else 1000.0 * value_m
 
 
 def _percent(value: float | None) -> float | None:

@@ -11,9 +11,9 @@ import tyro
 
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import read_toml
-from auvdock.episode.config import EpisodeCfg, level_cfg
+from auvdock.episode.config import EpisodeCfg, LandingEpisodeCfg, landing_level_cfg, level_cfg
 
-__all__ = ["DEFAULT_LEVEL", "base_config", "level_and_file", "parse"]
+__all__ = ["DEFAULT_LEVEL", "base_config", "landing_base_config", "level_and_file", "parse"]
 
 T = TypeVar("T")
 
@@ -39,6 +39,17 @@ def base_config(argv: Sequence[str], station: str = "conical") -> EpisodeCfg:
     """
     level, file = level_and_file(argv)
     cfg = level_cfg(level, station)
+    return cfg.override(read_toml(file)) if file is not None else cfg
+
+
+def landing_base_config(argv: Sequence[str]) -> LandingEpisodeCfg:
+    """As `base_config`, for landing.
+
+    Raises:
+        ConfigError: no such level, or a file that does not fit.
+    """
+    level, file = level_and_file(argv)
+    cfg = landing_level_cfg(level)
     return cfg.override(read_toml(file)) if file is not None else cfg
 
 

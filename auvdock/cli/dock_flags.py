@@ -1,0 +1,138 @@
+"""What the docking commands share: their flags, flying the episode, and showing its result."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+
+from auvdock.cli.display import ProgressDisplay, print_result
+from auvdock.core.errors import ConfigError, GraphicsError
+from auvdock.episode.result import EpisodeResult
+from auvdock.episode.runner import EpisodeRunner
+from auvdock.episode.trace import EpisodeObserver
+from auvdock.optics.gl import probe_gl
+
+__all__ = ["DockFlags", "fly"]
+
+
+@dataclass(frozen=True)
+class DockFlags:
+    """Flags of every docking command."""
+
+    seed: int = 0
+    """Decides start, current, sensor noise and camera noise."""
+    fidelity: Literal["pixels", "beacons", "auto"] | None = None
+    """pixels renders every frame; beacons draws detections from the same light model without an image; auto is pixels
+    where OpenGL works, else beacons."""
+    detector: str | None = None
+    """threshold, blob, cores, or your own as package.module:Name."""
+    controller: str | None = None
+    """A pilot of your own as package.module:Name, in place of the station's."""
+    water: str | None = None
+    """Water preset: I, IA, IB, II, III, 1C to 9C, clear, pool, lake."""
+    attenuation: float | None = None
+    """Beam attenuation at 450 nm in 1/m, in place of the preset's."""
+    current: float | None = None
+    """Speed of the current in m/s."""
+    current_direction: str | None = None
+    """Where the current flows to, degrees counter-clockwise from the station's x axis seen from above, or "random"."""
+    level: int = 1
+    """Difficulty 0 to 4; the flags change single things of it."""
+    config: Path | None = None
+    """TOML file with further settings, on top of the level."""
+    record: Path | None = None
+    """Write a Rerun recording here."""
+    json: bool = False
+    """Print the result as one JSON object and nothing else."""
+
+    def changes(self) -> dict[str, Any]:
+        """What the common flags change of the configuration.
+
+        Raises:
+            ConfigError: a value that does not fit.
+        """
+        changes: dict[str, Any] = {}
+        world: dict[str, Any] = changes.setdefault("world", {})
+        if self.fidelity is not None:
+            world["fidelity"] = _working_fidelity() if self.fidelity == "auto" else self.fidelity
+        if self.water is not None:
+            world["water"] = self.water
+        if self.attenuation is not None:
+            world["attenuation_per_m"] = _finite("attenuation", self.attenuation, "a finite attenuation in 1/m")
+        if self.current is not None:
+            speed = _finite("current", self.current, "a finite speed in m/s")
+            world.setdefault("sim", {}).setdefault("current", {})["speed_m_s"] = speed
+        if self.current_direction is not None:
+            start = world.setdefault("start", {})
+            start["random_current_direction"] = self.current_direction == "random"
+            if self.current_direction != "random":
+                degrees = _degrees(self.current_direction)
+                world.setdefault("sim", {}).setdefault("current", {})["direction_deg"] = degrees
+        if self.detector is not None:
+            changes["perception"] = {"detector": self.detector}
+        if self.controller is not None:
+            changes["control"] = {"controller": self.controller}
+        return changes
+
+
+def fly(
+    runner: EpisodeRunner, flags: DockFlags, title: str, check: Callable[[EpisodeResult], None] | None = None
+) -> int:
+    """Fly one episode as the flags say and show how it went.
+
+    Args:
+        runner: flies it.
+        flags: the command's flags.
+        title: of the result's table.
+        check: told of the result before it is shown.
+
+    Returns:
+        The exit code.
+    """
+    if flags.seed < 0:
+        raise ConfigError("seed", flags.seed, "a whole number of 0 or more")
+    cv2.setNumThreads(1)  # frames this small gain nothing from OpenCV's threads and stall on a busy machine
+    observers: list[EpisodeObserver] = []
+    if flags.record is not None:
+        from auvdock.recording.rerun_recorder import RerunRecorder
+
+        observers.append(RerunRecorder(flags.record))
+    if not flags.json:
+        observers.append(ProgressDisplay())
+    result = runner.run(flags.seed, observers)
+    if check is not None:
+        check(result)
+    if flags.json:
+        print(json.dumps(result.to_json(), allow_nan=False))
+    else:
+        print_result(result, flags.record, title)
+    return 0 if result.success else 1
+
+
+def _working_fidelity() -> str:
+    try:
+        probe_gl()
+    except GraphicsError as error:
+        print(f"auvdock: {error}", file=sys.stderr)
+        return "beacons"
+    return "pixels"
+
+
+def _finite(name: str, value: float, remedy: str) -> float:
+    if not math.isfinite(value):
+        raise ConfigError(name, value, remedy)
+    return value
+
+
+def _degrees(text: str) -> float:
+    try:
+        return _finite("current-direction", float(text), "degrees or 'random'")
+    except ValueError as error:
+        raise ConfigError("current-direction", text, "degrees or 'random'") from error
