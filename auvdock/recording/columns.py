@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 
-from auvdock.core.arrays import Array, BoolArray, IntArray
+from auvdock.core.arrays import Array
+from auvdock.core.landing_station import LandingStationCfg
 from auvdock.recording import paths
+from auvdock.recording.batch import Batch
+from auvdock.recording.landing_columns import LandingColumns
 from auvdock.recording.modes import ModeFollower
 from auvdock.recording.palette import CANDIDATE, IDENTIFIED, LOST, class_colours
 from auvdock.recording.pose_error import camera_in_station, pose_errors
@@ -50,7 +53,8 @@ class ColumnWriter:
         """Begin an episode."""
         self._stream = stream
         self._setup = setup
-        self._modes = ModeFollower()
+        self._landing = LandingColumns(setup) if isinstance(setup.station, LandingStationCfg) else None
+        self._modes = ModeFollower(self._landing is not None)
         self._last_camera_world_m: Array | None = None
 
     def write(self, rows: Sequence[Row]) -> None:
@@ -58,7 +62,7 @@ class ColumnWriter:
         frames = np.array([row.frame for row in rows], dtype=np.int64)
         times_s = np.array([row.tick.truth.time_s for row in rows])
         T_world_body = np.array([row.tick.truth.T_world_body for row in rows])
-        batch = _Batch(self._stream, frames, times_s)
+        batch = Batch(self._stream, frames, times_s)
         self._write_motion(batch, rows, T_world_body)
         self._write_pose(batch, rows, T_world_body)
         T_station_camera = camera_in_station(
@@ -67,9 +71,11 @@ class ColumnWriter:
         write_rotating(batch, [row.tick for row in rows], self._setup, T_station_camera)
         self._write_lights(batch, rows)
         self._write_modes(batch, rows)
+        if self._landing is not None:
+            self._landing.write(batch, [row.tick for row in rows])
         _write_images(batch, rows)
 
-    def _write_motion(self, batch: _Batch, rows: Sequence[Row], T_world_body: Array) -> None:
+    def _write_motion(self, batch: Batch, rows: Sequence[Row], T_world_body: Array) -> None:
         truths = [row.tick.truth for row in rows]
         current = np.array([truth.current_world_m_s for truth in truths])
         ground = np.linalg.norm([truth.nu_body[:3] for truth in truths], axis=1)
@@ -83,7 +89,7 @@ class ColumnWriter:
         batch.scalars(paths.CONTACT, np.array([truth.contact_force_n for truth in truths]))
         batch.scalars(paths.COMMANDS, np.array([row.tick.command.values for row in rows]))
 
-    def _write_pose(self, batch: _Batch, rows: Sequence[Row], T_world_body: Array) -> None:
+    def _write_pose(self, batch: Batch, rows: Sequence[Row], T_world_body: Array) -> None:
         T_world_station = self._setup.T_world_station
         T_station_camera = camera_in_station(T_world_station, T_world_body, self._setup.camera.T_body_camera)
         self._write_path(batch, (T_world_station @ T_station_camera)[:, :3, 3])
@@ -105,7 +111,7 @@ class ColumnWriter:
             positions = (T_world_station @ estimated)[:, :3, 3]
             batch.select(seen[has_pose]).send(paths.ESTIMATES, rr.Points3D.columns(positions=positions))
 
-    def _write_path(self, batch: _Batch, camera_world_m: Array) -> None:
+    def _write_path(self, batch: Batch, camera_world_m: Array) -> None:
         before = camera_world_m[0] if self._last_camera_world_m is None else self._last_camera_world_m
         self._last_camera_world_m = camera_world_m[-1]
         starts = np.vstack([before, camera_world_m[:-1]])
@@ -113,7 +119,7 @@ class ColumnWriter:
             paths.PATH, rr.LineStrips3D.columns(strips=np.stack([starts, camera_world_m], axis=1).astype(np.float32))
         )
 
-    def _write_lights(self, batch: _Batch, rows: Sequence[Row]) -> None:
+    def _write_lights(self, batch: Batch, rows: Sequence[Row]) -> None:
         seen = [(index, row.tick.percept) for index, row in enumerate(rows) if row.tick.percept is not None]
         if not seen:
             return
@@ -125,7 +131,7 @@ class ColumnWriter:
         counts = [(len(percept.detections), len(percept.tracks), percept.array_count) for percept in percepts]
         frames.scalars(paths.LIGHT_COUNTS, np.array(counts, dtype=np.float64))
 
-    def _write_modes(self, batch: _Batch, rows: Sequence[Row]) -> None:
+    def _write_modes(self, batch: Batch, rows: Sequence[Row]) -> None:
         modes = [row.tick.command.mode for row in rows]
         batch.scalars(paths.MODE_NUMBER, np.array([self._modes.number(mode) for mode in modes], dtype=np.float64))
         ahead_m = [row.tick.truth.to_go_m for row in rows]
@@ -135,32 +141,6 @@ class ColumnWriter:
             at = batch.select(np.array([change.row for change in changes]))
             at.send(paths.MODE_STATE, rr.StateChange.columns(state=[change.mode for change in changes]))
             at.send(paths.MODE_LOG, rr.TextLog.columns(text=[change.text for change in changes]))
-
-
-class _Batch:
-    """A stream at the times of some rows."""
-
-    def __init__(self, stream: rr.RecordingStream, frames: IntArray, times_s: Array) -> None:
-        self._stream = stream
-        self._frames = frames
-        self._times_s = times_s
-        self._index = (rr.TimeColumn(paths.SIM_TIME, duration=times_s), rr.TimeColumn(paths.FRAME, sequence=frames))
-
-    def select(self, index: IntArray) -> _Batch:
-        """Only some rows."""
-        if len(index) == len(self._frames):
-            return self
-        return _Batch(self._stream, self._frames[index], self._times_s[index])
-
-    def send(self, path: str, columns: Iterable[rr.ComponentColumn]) -> None:
-        """One row of each column per time."""
-        self._stream.send_columns(path, self._index, columns, strict=True)
-
-    def scalars(self, path: str, values: Array, present: BoolArray | None = None) -> None:
-        """One or several series; `values` has a row for each time, or for each that is `present`."""
-        width = 1 if values.ndim == 1 else values.shape[1]
-        lengths = np.full(len(self._frames), width) if present is None else width * present.astype(np.int64)
-        self.send(path, rr.Scalars.columns(scalars=values.ravel()).partition(lengths))
 
 
 def _measured(percept: Percept) -> PoseEstimate | None:
@@ -173,7 +153,7 @@ def _ranges(rows: Sequence[Row]) -> Array:
     return np.array([row.tick.truth.range_m for row in rows])
 
 
-def _write_detections(frames: _Batch, percepts: Sequence[Percept]) -> None:
+def _write_detections(frames: Batch, percepts: Sequence[Percept]) -> None:
     xyxy = np.concatenate([percept.detections.xyxy for percept in percepts]) + _PIXEL_CORNER
     colours = class_colours(np.concatenate([percept.detections.class_id for percept in percepts]))
     boxes = rr.Boxes2D.columns(
@@ -182,7 +162,7 @@ def _write_detections(frames: _Batch, percepts: Sequence[Percept]) -> None:
     frames.send(paths.DETECTIONS, boxes.partition([len(percept.detections) for percept in percepts]))
 
 
-def _write_tracks(frames: _Batch, percepts: Sequence[Percept]) -> None:
+def _write_tracks(frames: Batch, percepts: Sequence[Percept]) -> None:
     tracks = [track for percept in percepts for track in percept.tracks]
     centres = np.array([track.centre_px for track in tracks]).reshape(-1, 2) + _PIXEL_CORNER
     labels = [f"#{track.track_id}" if track.beacon_id is None else f"B{track.beacon_id}" for track in tracks]
@@ -191,7 +171,7 @@ def _write_tracks(frames: _Batch, percepts: Sequence[Percept]) -> None:
     frames.send(paths.TRACKS, points.partition([len(percept.tracks) for percept in percepts]))
 
 
-def _write_bearings(frames: _Batch, percepts: Sequence[Percept]) -> None:
+def _write_bearings(frames: Batch, percepts: Sequence[Percept]) -> None:
     named = [
         [(bearing, name) for bearing, name in ((percept.long_range, "far"), (percept.entrance, "entrance")) if bearing]
         for percept in percepts
@@ -202,7 +182,7 @@ def _write_bearings(frames: _Batch, percepts: Sequence[Percept]) -> None:
     frames.send(paths.BEARINGS, points.partition([len(pairs) for pairs in named]))
 
 
-def _write_images(batch: _Batch, rows: Sequence[Row]) -> None:
+def _write_images(batch: Batch, rows: Sequence[Row]) -> None:
     images = [(index, row.jpeg) for index, row in enumerate(rows) if row.jpeg is not None]
     if images:
         blobs = [np.frombuffer(jpeg, dtype=np.uint8) for _, jpeg in images]

@@ -6,10 +6,23 @@ from dataclasses import dataclass
 
 from auvdock.recording.palette import rgba
 
-__all__ = ["KNOWN_MODES", "MODE_COLOURS", "ModeChange", "ModeFollower"]
+__all__ = [
+    "KNOWN_MODES",
+    "LANDING_COLOURS",
+    "LANDING_MODES",
+    "LEVELS",
+    "LEVEL_COLOURS",
+    "MODE_COLOURS",
+    "ModeChange",
+    "ModeFollower",
+]
 
 KNOWN_MODES = ("acquire", "far", "mid", "near", "terminal", "docked", "abort", "approach", "circle", "lineup")
 """Modes of the package's own pilots, numbered from 0; those of a user's pilot get the numbers after them."""
+LANDING_MODES = ("search", "align", "descend", "touchdown")
+"""Modes of the landing pilot, beside "approach", "docked" and "abort"."""
+LEVELS = ("none", "lights", "tag", "fused")
+"""What a landing's pose rests on."""
 
 MODE_COLOURS = (
     rgba(130, 130, 140),
@@ -23,6 +36,13 @@ MODE_COLOURS = (
     rgba(190, 120, 190),
     rgba(110, 130, 220),
 )
+LANDING_COLOURS = (
+    rgba(130, 130, 140),
+    rgba(60, 160, 200),
+    rgba(230, 160, 50),
+    rgba(220, 110, 50),
+)
+LEVEL_COLOURS = (rgba(110, 110, 120), rgba(90, 130, 255), rgba(230, 200, 80), rgba(90, 200, 110))
 
 
 @dataclass(frozen=True)
@@ -43,8 +63,9 @@ class ModeChange:
 class ModeFollower:
     """Numbers the modes of an episode and notices their changes."""
 
-    def __init__(self) -> None:
-        """Start before the first tick."""
+    def __init__(self, landing: bool = False) -> None:
+        """Start before the first tick; `landing` tells what distances are from."""
+        self._landing = landing
         self._numbers = {mode: number for number, mode in enumerate(KNOWN_MODES)}
         self._current: str | None = None
 
@@ -58,11 +79,14 @@ class ModeFollower:
         Args:
             row: index of the tick within its batch.
             mode: the tick's mode.
-            ahead_m: how far the nose is in front of the mouth along the station's axis; negative inside.
+            ahead_m: how far the nose is in front of the mouth along the station's axis, negative inside; in landing how
+                far the seat is from its place.
         """
         if mode == self._current:
             return None
         where = f"{abs(ahead_m):.1f} m {'in front of' if ahead_m >= 0.0 else 'past'} the mouth"
+        if self._landing:
+            where = f"{ahead_m:.2f} m from the guides"
         text = f"{mode}, {where}" if self._current is None else f"{self._current} → {mode}, {where}"
         self._current = mode
         return ModeChange(row, mode, text)

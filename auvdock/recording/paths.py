@@ -22,12 +22,16 @@ __all__ = [
     "FUNNEL",
     "HULL",
     "IMAGE",
+    "LEVEL_STATE",
     "LIGHTS",
     "LIGHT_COUNTS",
     "MODE_LOG",
     "MODE_NUMBER",
     "MODE_STATE",
     "PATH",
+    "PLACE",
+    "PLACE_ANGLE",
+    "PLATFORM",
     "POSE_ANGLE",
     "POSE_ERROR",
     "RANGE",
@@ -38,6 +42,7 @@ __all__ = [
     "SPEED",
     "STATION",
     "SUMMARY",
+    "TAG_OUTLINE",
     "TRACKS",
     "TUBE",
     "VEHICLE",
@@ -55,6 +60,7 @@ WORLD = "/world"
 STATION = "/world/station"
 FUNNEL = "/world/station/funnel"
 TUBE = "/world/station/tube"
+PLATFORM = "/world/station/platform"
 LIGHTS = "/world/station/lights"
 BEAMS = "/world/station/beams"
 ROTATING_BEAM = "/world/station/rotating_beam"
@@ -66,6 +72,8 @@ IMAGE = "/world/vehicle/camera/image"
 DETECTIONS = "/world/vehicle/camera/detections"
 TRACKS = "/world/vehicle/camera/tracks"
 BEARINGS = "/world/vehicle/camera/bearings"
+TAG_OUTLINE = "/world/vehicle/camera/tag"
+"""The tag's outline where level II's own pose puts it."""
 PATH = "/world/camera_path"
 """True path of the camera, comparable with `ESTIMATES`."""
 ESTIMATES = "/world/camera_estimates"
@@ -74,6 +82,10 @@ BELIEVED = "/world/believed"
 """Where the pilot believes the camera to be, by the rotating beacon: two standard deviations."""
 CURRENT_ARROW = "/world/current"
 
+PLACE = "/plots/place_error_m"
+"""Landing: ξ, η, ζ of the vehicle's seat, true and estimated."""
+PLACE_ANGLE = "/plots/place_error_deg"
+"""Landing: ψ, true and estimated."""
 POSE_ERROR = "/plots/pose_error_m"
 POSE_ANGLE = "/plots/pose_angle_deg"
 REPROJECTION = "/plots/reprojection_px"
@@ -90,6 +102,8 @@ AZIMUTH_BELIEVED = "/plots/azimuth_deg/believed"
 AZIMUTH_FIX = "/plots/azimuth_deg/fix"
 RANGE_SIGMA = "/plots/range_sigma_m"
 
+LEVEL_STATE = "/perception/level"
+"""Landing: what the frame's pose rests on."""
 MODE_NUMBER = "/mode/number"
 MODE_STATE = "/mode/state"
 MODE_LOG = "/mode/log"

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 
 from auvdock.core.camera import Camera
-from auvdock.core.station import ConicalStationCfg
+from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.stations import StationCfg
-from auvdock.core.vehicle import VehicleCfg
 from auvdock.recording import paths
+from auvdock.recording.hull import hull_shapes
+from auvdock.recording.landing_scene import log_landing, plots_of
 from auvdock.recording.meshes import Mesh, beam_cone, frustum
-from auvdock.recording.modes import KNOWN_MODES, MODE_COLOURS
+from auvdock.recording.modes import KNOWN_MODES, LANDING_COLOURS, LANDING_MODES, MODE_COLOURS
 from auvdock.recording.palette import rgba, wavelength_rgb
 from auvdock.recording.rotating import beacon_of, log_rotating_scene
 
@@ -67,7 +67,10 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
     beacon = beacon_of(setup)
     if beacon is not None:
         log_rotating_scene(stream, beacon)
-    static(paths.HULL, _hull(setup.vehicle))
+    for path, shape in hull_shapes(setup.vehicle).items():
+        static(path, shape)
+    if isinstance(setup.station, LandingStationCfg):
+        log_landing(stream, setup.station)
     static(paths.CAMERA, _transform(setup.camera.T_body_camera), _pinhole(setup.camera))
     static(paths.PATH, rr.LineStrips3D.from_fields(colors=[rgba(255, 220, 80)], radii=[-1.5]))
     static(paths.ESTIMATES, rr.Points3D.from_fields(colors=[rgba(255, 90, 200)], radii=[-1.5]))
@@ -79,7 +82,7 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
         rr.Points2D.from_fields(radii=[-5.0], colors=[rgba(255, 255, 255, 160)], show_labels=True),
     )
     actuators = tuple((name, 0) for name in setup.vehicle.actuator_names)
-    for path, series in {**_PLOTS, paths.COMMANDS: actuators}.items():
+    for path, series in {**_PLOTS, **plots_of(setup.station), paths.COMMANDS: actuators}.items():
         names = [name for name, _ in series]
         # Actuators have no colours of their own: the viewer's palette tells any number of them apart.
         colours = np.array([colour for _, colour in series if colour], dtype=np.uint32)
@@ -89,7 +92,9 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
     )
     static(
         paths.MODE_STATE,
-        rr.StateConfiguration(values=list(KNOWN_MODES), colors=np.array(MODE_COLOURS, dtype=np.uint32)),
+        rr.StateConfiguration(
+            values=[*KNOWN_MODES, *LANDING_MODES], colors=np.array([*MODE_COLOURS, *LANDING_COLOURS], dtype=np.uint32)
+        ),
     )
 
 
@@ -107,7 +112,7 @@ def _mesh3d(mesh: Mesh, colour: int) -> rr.Mesh3D:
 
 
 def _station_meshes(station: StationCfg) -> dict[str, Mesh]:
-    if not isinstance(station, ConicalStationCfg):
+    if isinstance(station, LandingStationCfg):
         return {}
     funnel = station.funnel
     throat = np.array([-funnel.length_m, 0.0, 0.0])
@@ -140,19 +145,6 @@ def _log_lights(stream: rr.RecordingStream, layout: BeaconLayout) -> None:
             static=True,
             strict=True,
         )
-
-
-def _hull(vehicle: VehicleCfg) -> rr.Capsules3D:
-    # A capsule stands on its first cap's centre and points along z; the quarter turn about y lays it along x.
-    half = math.sqrt(0.5)
-    return rr.Capsules3D(
-        lengths=[vehicle.nose_x_m - vehicle.tail_x_m - 2.0 * vehicle.radius_m],
-        radii=[vehicle.radius_m],
-        translations=[[vehicle.tail_x_m + vehicle.radius_m, 0.0, 0.0]],
-        quaternions=[rr.Quaternion(xyzw=[0.0, half, 0.0, half])],
-        colors=[rgba(250, 190, 40)],
-        fill_mode=rr.components.FillMode.Solid,
-    )
 
 
 def _pinhole(camera: Camera) -> rr.Pinhole:
