@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 
@@ -11,14 +12,16 @@ from auvdock.core.arrays import Array
 from auvdock.core.calibrated_camera import CalibratedCameraCfg, make_calibrated_camera
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Proprioception
-from auvdock.core.errors import ConfigError
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.marine import flip_vector
+from auvdock.core.strict import load_toml
 from auvdock.core.transforms import quat_wxyz_from_euler_zyx
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.vehicle_world import Sensed, Start, VehicleWorld
+from auvdock.optics.detection_model import DetectionModelCfg
 from auvdock.optics.landing_camera import LandingCamera
+from auvdock.optics.landing_sensing import LandingSensor
 from auvdock.sim.truth import Truth
 
 __all__ = ["LandingWorld", "belly_camera", "draw_landing_start"]
@@ -66,8 +69,15 @@ class LandingWorld(VehicleWorld):
             self.simulator.T_world_station,
         )
         self.imager = LandingCamera(*optics, scene=self.simulator)
-        if cfg.fidelity != "pixels":
-            raise ConfigError("fidelity", cfg.fidelity, "'pixels', the only one that a landing knows yet")
+        self._sensor: LandingSensor | None = None
+        if cfg.fidelity == "beacons":
+            path = cfg.detection_model
+            self._sensor = LandingSensor(
+                *optics,
+                detector_name=detector,
+                tag_detector_name=tag_detector,
+                model=None if path is None else load_toml(DetectionModelCfg, Path(path)),
+            )
 
     def _draw_start(self, rng: np.random.Generator) -> Start:
         cfg = self.cfg
@@ -79,9 +89,12 @@ class LandingWorld(VehicleWorld):
         return Start(position_m, quat_wxyz, current)
 
     def _reset_camera(self, rng: np.random.Generator) -> None:
-        self.imager.reset(rng)
+        (self._sensor or self.imager).reset(rng)
 
     def _look(self, truth: Truth, proprioception: Proprioception) -> Sensed:
+        if self._sensor is not None:
+            detections, tags = self._sensor.detect(truth.T_world_body, truth.time_s)
+            return Sensed(proprioception, None, detections, tags)
         return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s), None)
 
     def close(self) -> None:
