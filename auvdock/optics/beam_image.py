@@ -1,9 +1,8 @@
 """Draws the rotating beacon's beam beside its lamp: the streak that one sees of it from the side.
 
-Each piece of the beam sends unscattered light, which shows the beam sharp: a ribbon along a great circle, Gaussian
-across, evaluated per pixel of the coarse grid of `Lens`. Its scattered light spreads by Wells' function about the
-piece; what of that falls within the piece's own size is a Gaussian of this size. These blobs are broad and are
-evaluated on every second row and column of the grid.
+The unscattered light shows the beam sharp: a ribbon along a great circle, Gaussian across, evaluated per pixel of the
+coarse grid of `Lens`. What scattering makes of the pieces (`optics.beam_pieces`) is broad and is evaluated on every
+second row and column of the grid.
 """
 
 from __future__ import annotations
@@ -14,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from auvdock.core.arrays import Array, IntArray
-from auvdock.optics.halo import halo_table
+from auvdock.core.arrays import Array
+from auvdock.optics.beam_pieces import BeamPieces, PieceLight
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.rotating_light import Beam
@@ -25,7 +24,6 @@ __all__ = ["BeamImage"]
 
 _ENTRIES = 384
 _RIBBON = 256
-_ANGLES = 512
 _LEAST_E = 0.05
 """Electrons in a pixel that are not worth drawing: a hundredth of the read noise."""
 
@@ -34,17 +32,14 @@ class BeamImage:
     """The beam of one rotating beacon on one camera's sensor."""
 
     def __init__(self, lens: Lens, lights: LightSet, lamp: int, water: WaterCfg) -> None:
-        """Tabulate the halo over angle, and the angles at which the pieces' own tables are made."""
+        """Precompute rays and the angles at which the pieces' tables are made."""
         self._shape = lens.shape
         # Tables are read at the fourth root of the squared chord: fine near the centre, wide outside.
         self._scale = np.float32((_ENTRIES - 1) / math.sqrt(2.0))
         index = np.arange(_ENTRIES) / float(self._scale)
         self._angle2 = (2.0 * np.arcsin(np.minimum(index**2 / 2.0, 1.0))) ** 2
-        self._table = halo_table(water.scattering_angle_rad)
-        self._log_angle = np.linspace(math.log(1e-4), math.log(math.pi), _ANGLES)
-        grid = np.exp(self._log_angle)
-        self._log_rows = np.log(self._table.density_rows(grid))
-        self._encircled = self._table.encircled_rows(grid)
+        self._least_rad = 0.7 * lens.factor * lens.rad_per_px
+        self._pieces = BeamPieces(water, 2.0 * self._least_rad)
         rays = lens.rays.astype(np.float32)
         self._rays = rays
         self._few_shape = (-(-lens.shape[0] // 2), -(-lens.shape[1] // 2))
@@ -53,54 +48,26 @@ class BeamImage:
         self._solid_angle = lens.solid_angle_sr.astype(np.float32)
         self._pixel_sr = lens.rad_per_px**2
         self._channel = lights.electrons_per_j[lamp] * lens.aperture_m2
-        self._least_rad = 0.7 * lens.factor * lens.rad_per_px
 
     def add(self, image: NDArray[np.float32], beam: Beam, exposure_s: float) -> None:
         """Add electrons per image pixel of the beam to the coarse grid (h, w, 3)."""
-        half = 0.7 * np.diff(beam.edge_rad)
-        size = np.hypot(np.maximum(half, 2.0 * self._least_rad), beam.width_rad)
-        row, weight = self._table.row_of(beam.scattering_depth)
-        within = self._blend(self._encircled, row, weight, np.log(np.minimum(size, math.pi)))
-        scattered = -np.expm1(-beam.scattering_depth)
-        # A beam that is wider than its piece is long has no direction left to show.
-        ribbon = (1.0 - scattered) / (1.0 + (beam.width_rad / half) ** 4)
-        blob = 1.0 - scattered - ribbon + scattered * within
+        pieces = self._pieces.light(beam)
         floor = _LEAST_E / (float(self._channel.max()) * exposure_s * self._pixel_sr)
-        radiance = self._blobs(beam, size, row, weight, scattered, blob, floor)
-        sharp = self._ribbon(beam, ribbon * beam.light_w_m2, floor)
+        radiance = self._blobs(beam, pieces, floor)
+        sharp = self._ribbon(beam, pieces.ribbon * beam.light_w_m2, floor)
         if sharp is not None:
             radiance = sharp if radiance is None else np.add(radiance, sharp, dtype=np.float32)
         if radiance is not None:
             radiance *= self._solid_angle
             image += radiance[:, :, None] * (self._channel * exposure_s).astype(np.float32)
 
-    def _blobs(
-        self, beam: Beam, size: Array, row: IntArray, weight: Array, scattered: Array, blob: Array, floor: float
-    ) -> NDArray[np.float32] | None:
-        """(h, w) radiance about the pieces: Gaussians of their size, and halos that are as about points outside it."""
-        peak = np.exp(self._blend(self._log_rows, row, weight, np.log(np.minimum(size, math.pi)))) * scattered
-        peak += blob / (2.0 * math.pi * size**2)
-        index = np.flatnonzero(peak * beam.light_w_m2 > floor)
+    def _blobs(self, beam: Beam, pieces: PieceLight, floor: float) -> NDArray[np.float32] | None:
+        """(h, w) radiance of the Gaussians and halos about the pieces."""
+        tables = self._pieces.per_sr(pieces, self._angle2, pieces.blob)
+        tables *= beam.light_w_m2[:, None]
+        index = np.flatnonzero(tables[:, 0] > floor)
         if len(index) == 0:
             return None
-        size, row, weight, light = size[index], row[index], weight[index], beam.light_w_m2[index]
-        size2 = size[:, None] ** 2
-        rows = self._log_rows[row] * (1.0 - weight[:, None]) + self._log_rows[row + 1] * weight[:, None]
-        place = 0.5 * np.log(self._angle2 + size2)
-        place -= self._log_angle[0]
-        place *= 1.0 / (self._log_angle[1] - self._log_angle[0])
-        column = place.astype(np.int64)
-        np.minimum(column, _ANGLES - 2, out=column)
-        place -= column
-        column += (np.arange(len(index)) * _ANGLES)[:, None]
-        low = rows.take(column)
-        tables = rows.take(column + 1)
-        tables -= low
-        tables *= place
-        tables += low
-        np.exp(tables, out=tables)
-        tables *= (scattered[index] * light)[:, None]
-        tables += np.exp(self._angle2 * (-0.5 / size2)) * (blob[index] * light / (2.0 * math.pi * size**2))[:, None]
         chord2 = 2.0 - 2.0 * (beam.rays_camera[index].astype(np.float32) @ self._few.T)
         np.maximum(chord2, 0.0, out=chord2)
         np.sqrt(chord2, out=chord2)
@@ -110,7 +77,7 @@ class BeamImage:
         np.minimum(entry, _ENTRIES - 2, out=entry)
         chord2 -= entry
         entry += (np.arange(len(index), dtype=np.int32) * _ENTRIES)[:, None]
-        flat = tables.astype(np.float32).ravel()
+        flat = tables[index].astype(np.float32).ravel()
         lower = flat.take(entry)
         entry += 1
         value = flat.take(entry)
@@ -146,12 +113,3 @@ class BeamImage:
         shown *= along.astype(np.float32).take(entry)
         shown[before] = 0.0
         return np.asarray(shown.reshape(self._shape), dtype=np.float32)
-
-    def _blend(self, rows: Array, row: IntArray, weight: Array, log_angle: Array) -> Array:
-        """(k,) values of a table over (row, log angle), linear in both."""
-        place = (log_angle - self._log_angle[0]) / (self._log_angle[1] - self._log_angle[0])
-        column = np.minimum(place.astype(np.int64), _ANGLES - 2)
-        right = place - column
-        low = rows[row, column] * (1.0 - right) + rows[row, column + 1] * right
-        high = rows[row + 1, column] * (1.0 - right) + rows[row + 1, column + 1] * right
-        return low * (1.0 - weight) + high * weight

@@ -12,6 +12,7 @@ from scipy.optimize import linear_sum_assignment, minimize
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.core.contracts import Detections, Detector
 from auvdock.optics.detection_model import Candidates, DetectionModelCfg, merge_close, veiled_share
+from auvdock.optics.flash import FlashOptics
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.sensing import candidates_in_view
 
@@ -43,10 +44,11 @@ def observe(
     """Render one frame at each body pose (4, 4), with fresh noise and settled exposure, and run the detector on it."""
     observations: list[Observation] = []
     size = (imager.lit.camera.width_px, imager.lit.camera.height_px)
+    flash = FlashOptics(imager.lit)
     for pose in poses:
         imager.reset(rng.spawn(1)[0])
         shot = imager.take(pose, 0.0)
-        spots = imager.lit.spots.spots(shot.view.received, shot.view.inside.nonzero()[0])
+        spots = flash.spots(shot.view)
         seen, _ = candidates_in_view(imager.lit, shot.view, spots, shot.exposure_s, shot.gain)
         observations.append(Observation(seen, detector.detect(shot.frame), size))
     return observations

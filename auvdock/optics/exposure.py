@@ -19,6 +19,7 @@ from auvdock.optics.settings import ExposureCfg
 __all__ = ["AutoExposure", "frames_of_a_turn"]
 
 
+_METERED_WITH_MEMORY = 0.5
 _GREATEST_FALL = 4.0
 _GREATEST_RISE = 2.0
 
@@ -44,8 +45,12 @@ class AutoExposure:
         """
         self._cfg = cfg
         self._memory: deque[tuple[float, float]] | None = None
+        self.metered = 1.0
+        """Share of the saturation level above which samples count: a half with a memory, so that a flash that comes
+        somewhat brighter than the last still does not saturate."""
         if memory_frames > 0:
             self._memory = deque(maxlen=memory_frames)
+            self.metered = _METERED_WITH_MEMORY
         self._sensitivity_s = cfg.initial_s
         self.settled = False
 

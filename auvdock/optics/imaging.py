@@ -166,13 +166,14 @@ class UnderwaterCamera:
             self._settle(view)
         exposure_s, gain = self.exposure.exposure_s, self.exposure.gain
         image = self._sensor.expose(self.electrons(view, exposure_s, gain), gain)
-        self.exposure.update(saturated_share(image))
+        code = self.lit.scale(gain).metered_code(self.exposure.metered)
+        self.exposure.update(saturated_share(image, code))
         return Shot(Frame(image, time_s, self._camera, exposure_s, gain, self._response), view, exposure_s, gain)
 
     def _settle(self, view: View) -> None:
         """Choose the first exposure: from the lights, or from a trial picture where tag and lamp count as well."""
         if self.tag is None and self.lit.lamp is None:
-            self.exposure.settle(predicted_share(self.lit, view))
+            self.exposure.settle(predicted_share(self.lit, view, metered=self.exposure.metered))
             return
         bright = np.sort(self.electrons(view, 1.0).reshape(-1)[::7])
         level = SensorScale(self._cfg, 1.0).saturated_e

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.optics.flash import FlashOptics
 from auvdock.optics.scene import LitScene, View
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.spots import Spots
@@ -14,13 +15,16 @@ from auvdock.optics.spots import Spots
 __all__ = ["predicted_share", "veil_share"]
 
 
-def predicted_share(lit: LitScene, view: View, spots: Spots | None = None) -> Callable[[float], float]:
+def predicted_share(
+    lit: LitScene, view: View, spots: Spots | None = None, metered: float = 1.0
+) -> Callable[[float], float]:
     """Saturated share of the image as a function of sensitivity in seconds.
 
-    Lights whose centre lies off the sensor, overlap of spots and surfaces are left out; the veil counts.
+    With `metered` below 1 it is the share that is brighter than so much of the saturation level. Lights whose centre
+    lies off the sensor, overlap of spots and surfaces are left out; the veil counts.
     """
-    shown = lit.spots.spots(view.received, np.flatnonzero(view.inside)) if spots is None else spots
-    saturated_e = SensorScale(lit.cfg, 1.0).saturated_e
+    shown = FlashOptics(lit).spots(view) if spots is None else spots
+    saturated_e = SensorScale(lit.cfg, 1.0).saturated_e * metered
     model = lit.spots
     veil_e_s = lit.veil_e_s(-float(view.T_world_camera[2, 3]))
 

@@ -36,6 +36,10 @@ __all__ = ["Beam", "RotatingLight"]
 
 _PIECES = 10
 _NODES = 4
+_STEPS = (np.arange(_PIECES + 1) / _PIECES) ** 1.5
+"""The pieces' borders in the logarithm of the scattering angle: fine by the lamp."""
+_AT_LAMP = 0.35
+"""Up to this share of the first piece, light counts as from the lamp itself."""
 _REACH_RAD = 1.7
 """A little more than a camera's diagonal."""
 _TURN_NODES, _TURN_WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -143,7 +147,7 @@ class RotatingLight:
         # The angle as the rays of a beam of some width have it in the mean.
         apart = min(math.sqrt(angle**2 + self._near2), math.pi - 0.02)
         reach = min(_REACH_RAD, 0.98 * (math.pi - apart))
-        edge = apart * (((apart + reach) / apart) ** (np.arange(_PIECES + 1) / _PIECES) - 1.0)
+        edge = apart * (((apart + reach) / apart) ** _STEPS - 1.0)
         step = np.diff(edge) / _NODES
         phi = edge[:-1, None] + step[:, None] * (np.arange(_NODES) + 0.5)
         opening = np.sin(apart + phi)
@@ -151,12 +155,14 @@ class RotatingLight:
         excess = wide_angle_phase(apart + phi, self._theta0) * np.exp(-self._a * (s + d))
         light = self._flux * self._b / (r * math.sin(apart)) * excess.sum(axis=1) * step
         lead = float(self._spread.lead_rad(np.array([self._b * r]), np.array([angle]))[0])
-        beyond = (1.0 + edge / max(lead, 1e-6)) ** -2
+        border = edge.copy()
+        border[0] = _AT_LAMP * edge[1]
+        beyond = (1.0 + border / max(lead, 1e-6)) ** -2
         share = np.diff(beyond) / (beyond[-1] - 1.0)
-        light[1:] += halo * share[1:]
+        light += halo * share
         s, d = s.mean(axis=1), d.mean(axis=1)
         width = np.hypot(self._sigma, 0.5 * self._theta0 * self._b * s) * s / d
         middle = phi.mean(axis=1)
         rays = np.cos(middle)[:, None] * ray + np.sin(middle)[:, None] * along
         beam = Beam(angle, ray, along, edge, rays, d, self._b * d, light, width)
-        return beam, halo * float(share[0])
+        return beam, halo * (1.0 - float(share.sum()))

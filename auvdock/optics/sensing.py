@@ -20,7 +20,7 @@ from auvdock.optics.detection_model import (
     squared_distances,
 )
 from auvdock.optics.exposure import AutoExposure, frames_of_a_turn
-from auvdock.optics.flash import beam_profiles, flash_shape, measured_light
+from auvdock.optics.flash import FlashOptics, with_flash
 from auvdock.optics.metering import predicted_share, veil_share
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.scene import LitScene, View
@@ -30,9 +30,6 @@ from auvdock.optics.spots import Spots
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeaconSensor", "candidates_in_view"]
-
-_BLUE = 2
-_BACKGROUND_PX = FlashModelCfg().background_px
 
 
 class BeaconSensor:
@@ -68,6 +65,7 @@ class BeaconSensor:
         """
         self.model = model if model is not None else load_detection_model(detector_name)
         self.lit = LitScene(camera, water, layout, nuisance, cfg, T_world_station, rotating)
+        self._flash = FlashOptics(self.lit)
         self.exposure = AutoExposure(cfg.exposure, frames_of_a_turn(camera, rotating))
         self._size = (camera.width_px, camera.height_px)
         self._rng = np.random.default_rng(0)
@@ -83,12 +81,12 @@ class BeaconSensor:
         """Detections of a frame from a body pose (4, 4); times as in `UnderwaterCamera.capture`."""
         exposure = self.exposure
         view = self.lit.look(T_world_body, time_s, station_time_s, exposure.exposure_s)
-        index = view.inside.nonzero()[0]
-        spots = self.lit.spots.spots(view.received, index)
+        spots = self._flash.spots(view)
         if not exposure.settled:
-            exposure.settle(predicted_share(self.lit, view, spots))
-        background_px = self.model.flash.background_px if self.model.flash is not None else _BACKGROUND_PX
-        seen, share = candidates_in_view(self.lit, view, spots, exposure.exposure_s, exposure.gain, background_px)
+            exposure.settle(predicted_share(self.lit, view, spots, exposure.metered))
+        seen, share = candidates_in_view(self.lit, view, spots, exposure.exposure_s, exposure.gain, self.model.flash)
+        if exposure.metered < 1.0:
+            share = predicted_share(self.lit, view, spots, exposure.metered)(exposure.sensitivity_s)
         exposure.update(share)
         return draw_detections(seen, self.model, self._size, self._rng)
 
@@ -99,7 +97,7 @@ def candidates_in_view(
     spots: Spots,
     exposure_s: float,
     gain: float,
-    background_px: float = _BACKGROUND_PX,
+    flash_model: FlashModelCfg | None = None,
     ground_e_s: Array | None = None,
 ) -> tuple[Candidates, float]:
     """The lights on the sensor as a detector meets them, and the saturated share of the image.
@@ -112,7 +110,7 @@ def candidates_in_view(
         spots: profiles of those whose centre is on the sensor, in the order of `view.inside`.
         exposure_s: exposure time.
         gain: analogue gain.
-        background_px: radius at which the detector takes a flash's halo for background.
+        flash_model: how the detector meets a rotating beacon; None: the defaults.
         ground_e_s: (3,) electrons per second and pixel of the surfaces behind the lights, in place of the veil.
     """
     pixels = view.pixels.compress(view.inside, 0)
@@ -151,60 +149,11 @@ def candidates_in_view(
         gap2,
         best == 0,
     )
-    if view.beam is not None and lit.rotating is not None:
-        seen = _with_flash(lit, view, spots, seen, scale, exposure_s, background_px)
+    if view.beam is not None:
+        seen = with_flash(lit, spots, seen, scale, exposure_s, flash_model or FlashModelCfg())
     if view.flakes is None:
         return seen, share
     return _with_flakes(lit, view, seen, scale, exposure_s), share
-
-
-def _with_flash(
-    lit: LitScene,
-    view: View,
-    spots: Spots,
-    seen: Candidates,
-    scale: SensorScale,
-    exposure_s: float,
-    background_px: float,
-) -> Candidates:
-    """The lights with the rotating beacon's shape and everyone's flux."""
-    model, beam, rotating = lit.spots, view.beam, lit.rotating
-    if beam is None or rotating is None:
-        return seen
-    light, noise = measured_light(lit, spots, seen, exposure_s)
-    seen = seen._replace(light_e_s=light, light_noise_e_s=noise)
-    place = np.flatnonzero(view.inside.nonzero()[0] == rotating.lamp)
-    if len(place) == 0:
-        return seen
-    k = int(place[0])
-    channel = float(spots.channel[k].max()) * exposure_s
-    profiles = (beam_profiles(beam, model, lit.lens.rad_per_px) + spots.profile[k]) * channel
-    # The others' light where the detector sees background: on a circle about the flash.
-    others = model.at_distance(spots, seen.distance2_px2 + background_px**2)[k] * spots.channel[:, _BLUE] * exposure_s
-    around_e = float(others.sum() - others[k])
-    shape = flash_shape(profiles, around_e, model.radii_px, background_px, scale, k, seen.pixels[k], beam, lit.camera)
-    contrast, surround, pixels = seen.contrast_dn.copy(), seen.surround_dn.copy(), seen.pixels.copy()
-    # To a detector the flash and what lies within it are one light; so are a bright light and a flash within that.
-    reach_px = np.maximum(float(np.mean(shape.flash.half_px)), 2.0 * seen.radius_px)
-    part = seen.distance2_px2[k] < reach_px**2
-    part[k] = True
-    members = np.flatnonzero(part)
-    lead = int(members[np.argmax(seen.flux[members])])
-    if lead == k or 2.0 * seen.surround_dn[k] < seen.contrast_dn[k]:
-        contrast[k] = shape.contrast_dn
-    else:
-        # It stands on the slope of another's halo.
-        contrast[k] = min(shape.contrast_dn, float(contrast[k]))
-    surround[k] = shape.background_dn
-    weight = light[members]
-    if len(members) > 1 and weight.sum() > 0.0:
-        pixels[lead] = weight @ pixels[members] / weight.sum()
-        light[lead] = weight.sum()
-        contrast[members[members != lead]] = 0.0
-        if contrast[lead] < shape.contrast_dn:
-            contrast[lead] = shape.contrast_dn
-            shape = shape._replace(flash=shape.flash._replace(place=lead))
-    return seen._replace(pixels=pixels, contrast_dn=contrast, surround_dn=surround, flash=shape.flash)
 
 
 def _with_flakes(lit: LitScene, view: View, seen: Candidates, scale: SensorScale, exposure_s: float) -> Candidates:

@@ -58,6 +58,12 @@ class SensorScale:
             return codes * (self.full_scale_e / 255.0)
         return (codes / self.dn_per_root + self.read_e) ** 2 - self._read2
 
+    def metered_code(self, metered: float) -> int:
+        """Code from which samples count in the exposure metering, at a share of the saturation level."""
+        if metered == 1.0:
+            return SATURATED_CODE
+        return round(float(self.codes(np.array([metered * self.saturated_e]))[0]))
+
     def noise_dn(self, electrons: Array) -> Array:
         """Standard deviation of the code at a signal in electrons, quantisation included."""
         if self._linear:
@@ -113,7 +119,7 @@ class Sensor:
         return image
 
 
-def saturated_share(image: Image) -> float:
-    """Share of an image's samples at or above `SATURATED_CODE`."""
+def saturated_share(image: Image, code: int = SATURATED_CODE) -> float:
+    """Share of an image's samples at or above a code."""
     flat = image.reshape(image.shape[0], -1)
-    return cv2.countNonZero(cv2.threshold(flat, SATURATED_CODE - 1, 255, cv2.THRESH_BINARY)[1]) / flat.size
+    return cv2.countNonZero(cv2.threshold(flat, code - 1, 255, cv2.THRESH_BINARY)[1]) / flat.size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,10 +14,26 @@ from auvdock.optics.radiometry import LightSet, Received
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.water import WaterCfg
 
-__all__ = ["SpotModel", "Spots"]
+__all__ = ["FlashLines", "SpotModel", "Spots"]
 
 _RADII = 32
 _TWO_PI = 2.0 * math.pi
+
+
+class FlashLines(NamedTuple):
+    """A rotating beacon's spot, lamp and beam together, about its brightest point.
+
+    Attributes:
+        place: index among the lights in view.
+        middle_px: distance of that point from the lamp, along the beam's image.
+        way: (2,) unit direction of the beam's image on the sensor.
+        lines: (3, k) irradiance per pixel at `SpotModel.radii_px` from that point: ahead, back and across, W/m².
+    """
+
+    place: int
+    middle_px: float
+    way: Array
+    lines: Array
 
 
 class Spots:
@@ -28,13 +45,15 @@ class Spots:
         sigma_px: (m,) width of the core on the sensor.
         profile: (m, k) irradiance per pixel at `SpotModel.radii_px`, W/m² per pixel.
         channel: (m, 3) electrons per second for 1 W/m² on a pixel: red, green, blue.
+        flash: the rotating beacon among them, None if there is none in view.
     """
 
-    __slots__ = ("channel", "core", "halo", "profile", "sigma_px")
+    __slots__ = ("channel", "core", "flash", "halo", "profile", "sigma_px")
 
     def __init__(self, core: Array, halo: Array, sigma_px: Array, profile: Array, channel: Array) -> None:
         """Hold the arrays."""
         self.core, self.halo, self.sigma_px, self.profile, self.channel = core, halo, sigma_px, profile, channel
+        self.flash: FlashLines | None = None
 
 
 class SpotModel:
@@ -55,8 +74,8 @@ class SpotModel:
         self._per_log2 = 0.5 / math.log(self.radii_px[1] / self.radii_px[0])
         self._starts = np.arange(0, lights.count * _RADII, _RADII)
         table = halo_table(water.scattering_angle_rad)
-        self.table = table
-        self.rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
+        self._table = table
+        self._rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
         self._lens_sigma2 = cfg.lens_sigma_px**2
         self._lamp_px_m2 = (cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2
         self._channel = lights.electrons_per_j * lens.aperture_m2
@@ -71,10 +90,10 @@ class SpotModel:
         core, halo, range_m = received.core_w_m2[index], received.halo_w_m2[index], received.range_m[index]
         sigma2 = self._lamp_px_m2 / (range_m * range_m)
         sigma2 += self._lens_sigma2
-        row, weight = self.table.row_of(received.scattering_depth[index])
-        lower = self.rows.take(row, 0)
+        row, weight = self._table.row_of(received.scattering_depth[index])
+        lower = self._rows.take(row, 0)
         row += 1
-        profile = self.rows.take(row, 0)
+        profile = self._rows.take(row, 0)
         profile -= lower
         profile *= weight[:, None]
         profile += lower

@@ -1,0 +1,104 @@
+"""How the light of a beam's pieces spreads about them, for the renderer and for the `beacons` fidelity alike.
+
+A piece sends unscattered light, which shows the beam as it is, and scattered light, which spreads by Wells' function.
+What of that falls within the piece's own size is a Gaussian of this size; farther out the halo is as about a point. A
+beam that is wider than its piece is long has no direction left to show: its unscattered light is a Gaussian as well.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from auvdock.core.arrays import Array, IntArray
+from auvdock.optics.halo import halo_table
+from auvdock.optics.rotating_light import Beam
+from auvdock.optics.water import WaterCfg
+
+__all__ = ["BeamPieces", "PieceLight"]
+
+_ANGLES = 512
+_FIRST_RAD = 1e-4
+_FILL = 0.7
+"""Standard deviation of a piece's Gaussian over the piece's length."""
+
+
+class PieceLight(NamedTuple):
+    """Shares of a beam's pieces (k,) and their sizes.
+
+    Attributes:
+        size_rad: (k,) standard deviation of the Gaussians.
+        log_density: (k, angles) logarithm of each piece's halo per steradian and scattered light, over log angle.
+        scattered: (k,) share that is scattered on the way to the camera.
+        ribbon: (k,) share that shows the beam sharp.
+        blob: (k,) share in the Gaussian.
+    """
+
+    size_rad: Array
+    log_density: Array
+    scattered: Array
+    ribbon: Array
+    blob: Array
+
+
+class BeamPieces:
+    """Tables of one water."""
+
+    def __init__(self, water: WaterCfg, least_rad: float) -> None:
+        """Tabulate the halo.
+
+        Args:
+            water: gives Wells' θ0.
+            least_rad: least size of a piece's Gaussian.
+        """
+        self._table = halo_table(water.scattering_angle_rad)
+        self._first, self._last = math.log(_FIRST_RAD), math.log(math.pi)
+        self._per_step = (_ANGLES - 1) / (self._last - self._first)
+        grid = np.exp(np.linspace(self._first, self._last, _ANGLES))
+        self._log_rows = np.log(self._table.density_rows(grid))
+        self._encircled = self._table.encircled_rows(grid)
+        self._least_rad = least_rad
+
+    def light(self, beam: Beam) -> PieceLight:
+        """How the pieces' light divides."""
+        length = _FILL * np.diff(beam.edge_rad)
+        size = np.hypot(np.maximum(length, self._least_rad), beam.width_rad)
+        row, weight = self._table.row_of(beam.scattering_depth)
+        column, right = self._place(0.5 * np.log(np.minimum(size, math.pi) ** 2))
+        low = self._encircled[row, column] * (1.0 - right) + self._encircled[row, column + 1] * right
+        high = self._encircled[row + 1, column] * (1.0 - right) + self._encircled[row + 1, column + 1] * right
+        within = low * (1.0 - weight) + high * weight
+        scattered = -np.expm1(-beam.scattering_depth)
+        ribbon = (1.0 - scattered) / (1.0 + (beam.width_rad / length) ** 4)
+        blob = 1.0 - scattered - ribbon + scattered * within
+        rows = self._log_rows[row] * (1.0 - weight[:, None]) + self._log_rows[row + 1] * weight[:, None]
+        return PieceLight(size, rows, scattered, ribbon, blob)
+
+    def per_sr(self, pieces: PieceLight, angle2: Array, gauss: Array) -> Array:
+        """(k, n) share of each piece's light per steradian at squared angles (n,) or (k, n) from it.
+
+        Args:
+            pieces: of the beam.
+            angle2: squared angles.
+            gauss: (k,) shares in the Gaussians, `blob` or with the ribbon on top.
+        """
+        size2 = pieces.size_rad[:, None] ** 2
+        column, right = self._place(0.5 * np.log(angle2 + size2))
+        column += (np.arange(len(size2)) * _ANGLES)[:, None]
+        low = pieces.log_density.take(column)
+        density = pieces.log_density.take(column + 1)
+        density -= low
+        density *= right
+        density += low
+        np.exp(density, out=density)
+        density *= pieces.scattered[:, None]
+        density += np.exp(angle2 * (-0.5 / size2)) * (gauss / (2.0 * math.pi * pieces.size_rad**2))[:, None]
+        return density
+
+    def _place(self, log_angle: Array) -> tuple[IntArray, Array]:
+        """Column below each log angle and the weight of the one above."""
+        place = (log_angle - self._first) * self._per_step
+        column = np.minimum(place.astype(np.int64), _ANGLES - 2)
+        return column, place - column
