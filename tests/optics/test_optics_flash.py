@@ -7,6 +7,7 @@ import pytest
 from optics_scene import DEPTH_M, T_WORLD_STATION, camera, imager
 
 from auvdock.core.contracts import BLUE
+from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.station import load_conical_station
 from auvdock.core.transforms import make_transform
 from auvdock.optics.detection_model import load_detection_model
@@ -19,7 +20,7 @@ from auvdock.optics.water import load_water
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
 STATION = load_conical_station("rotating")
-BEACON = STATION.rotating
+BEACON = STATION.rotating or RotatingBeaconCfg()
 POOL = load_water("pool")
 SCENE = (camera(), POOL, STATION.layout, NuisanceCfg(), ImagingCfg(surfaces=False), T_WORLD_STATION)
 BEHIND = 2.4
@@ -52,18 +53,25 @@ def seen_and_found(range_m, degrees, detector):
     shot = unit.take(place(range_m), facing_s() + degrees / 360.0 / BEACON.rate_rev_s)
     spots = FlashOptics(unit.lit).spots(shot.view)
     seen, _ = candidates_in_view(unit.lit, shot.view, spots, shot.exposure_s, shot.gain)
-    return seen, detector.detect(shot.frame), shot.view.pixels[unit.lit.rotating.lamp]
+    assert unit.lit.rotating is not None
+    assert seen.flash is not None
+    assert seen.light_e_s is not None
+    place_, half, shift = seen.flash
+    said = (float(seen.contrast_dn[place_]), float(seen.light_e_s[place_]), half, shift)
+    return said, detector.detect(shot.frame), shot.view.pixels[unit.lit.rotating.lamp]
 
 
 @pytest.mark.parametrize(("range_m", "degrees"), [(12.0, 0.0), (20.0, 6.0), (20.0, -12.0), (30.0, 0.0), (40.0, 3.0)])
 def test_flux_box_and_centre_are_the_renderer_s(range_m, degrees):
     """Flux within a factor of 1.7, centre and half box within 6 px or a third: what the model claims to be good for."""
-    seen, found, lamp_px = seen_and_found(range_m, degrees, ThresholdDetector(ThresholdCfg(flux=True)))
+    said, found, lamp_px = seen_and_found(range_m, degrees, ThresholdDetector(ThresholdCfg(flux=True)))
     ways = load_detection_model("threshold").flash
     best = int(np.argmin(np.linalg.norm(found.centre_px - lamp_px, axis=1)))
-    place_, half, shift = seen.flash
-    assert seen.contrast_dn[place_] > ways.contrast_50_dn
-    assert 1.0 / 1.7 < found.flux[best] / seen.light_e_s[place_] < 1.7
+    contrast_dn, light_e_s, half, shift = said
+    assert ways is not None
+    assert found.flux is not None
+    assert contrast_dn > ways.contrast_50_dn
+    assert 1.0 / 1.7 < found.flux[best] / light_e_s < 1.7
     expected = lamp_px + ways.centre_shift * shift
     assert np.linalg.norm(found.centre_px[best] - expected) < 6.0
     size = found.xyxy[best, 2:] - found.xyxy[best, :2]
@@ -79,6 +87,7 @@ def test_flash_comes_and_goes_with_the_turn():
         if k >= 60:
             counts.setdefault(round(degrees), []).append(len(found))
             if len(found):
+                assert found.flux is not None
                 assert found.class_id[0] == BLUE
                 assert np.all(found.flux > 0.0)
     assert all(min(n) >= 1 for degrees, n in counts.items() if abs(degrees) <= 9)
@@ -91,7 +100,7 @@ def test_flux_rises_to_the_facing_frame():
     for k in range(60, 180):
         degrees = math.degrees(math.remainder(BEACON.azimuth_rad(k / 30.0) - BEHIND, math.tau))
         found = unit.detect(body, k / 30.0)
-        if len(found) and abs(degrees) < 22.0:
+        if found.flux is not None and len(found) and abs(degrees) < 22.0:
             flux.setdefault(round(degrees), []).append(float(found.flux[0]))
     order = sorted(flux, key=abs)
     means = [np.mean(flux[degrees]) for degrees in order]
@@ -105,6 +114,8 @@ def test_station_time_decides_in_the_beacons_fidelity():
     # Looked at by an eye used to the dark, the beam that points away is still a glow.
     away = other.detect(place(20.0), facing_s(), station_time_s=facing_s() + 1.0)
     assert len(facing) == 1
+    assert facing.flux is not None
+    assert away.flux is not None
     assert np.all(away.flux < 0.01 * facing.flux)
 
 

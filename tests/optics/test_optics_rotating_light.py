@@ -11,6 +11,7 @@ from optics_scene import DEPTH_M, T_WORLD_STATION, camera, far_ring
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.transforms import make_transform
+from auvdock.optics.beam_image import BeamImage
 from auvdock.optics.imaging import ExposureCfg, ImagingCfg, UnderwaterCamera
 from auvdock.optics.light import beam_profile, profile_solid_angle_sr
 from auvdock.optics.nuisance import NuisanceCfg
@@ -49,11 +50,23 @@ def off(degrees, bearing_rad=0.0):
     return (math.degrees(bearing_rad) + degrees) / 360.0 / BEACON.rate_rev_s
 
 
+def lamp_of(unit):
+    """Index of the rotating beacon's lamp."""
+    assert unit.lit.rotating is not None
+    return unit.lit.rotating.lamp
+
+
+def beam_of(unit, range_m, degrees):
+    beam = unit.lit.look(place(range_m), off(degrees)).beam
+    assert beam is not None
+    return beam
+
+
 def streak(unit, range_m, degrees):
     """(h, w) electrons of the beam beside its lamp."""
-    view = unit.lit.look(place(range_m), off(degrees))
     image = np.zeros((*unit.lit.lens.shape, 3), dtype=np.float32)
-    unit._beam_image.add(image, view.beam, 1.0)
+    lit = unit.lit
+    BeamImage(lit.lens, lit.lights, lamp_of(unit), lit.water).add(image, beam_of(unit, range_m, degrees), 1.0)
     return image[:, :, 2].astype(float)
 
 
@@ -61,7 +74,7 @@ def test_core_is_the_profile_times_beer_lambert():
     unit = eye()
     for range_m, degrees in ((5.0, 0.0), (5.0, 4.0), (12.0, -7.0)):
         received = unit.lit.look(place(range_m, 0.4), off(degrees, 0.4)).received
-        lamp = unit.lit.rotating.lamp
+        lamp = lamp_of(unit)
         peak = 30.0 * 0.35 / profile_solid_angle_sr(10.0)
         share = float(beam_profile(np.array(math.radians(degrees)), 10.0))
         expected = peak * share * math.exp(-0.40 * range_m) / range_m**2
@@ -69,18 +82,20 @@ def test_core_is_the_profile_times_beer_lambert():
 
 
 def test_scattered_light_is_seen_off_the_axis_and_only_with_scattering():
-    lamp = eye().lit.rotating.lamp
-    halos = [eye().lit.look(place(20.0), off(d)) for d in (0.0, 10.0, 20.0, 60.0)]
-    total = [float(view.received.halo_w_m2[lamp] + view.beam.light_w_m2.sum()) for view in halos]
+    lamp = lamp_of(eye())
+    unit, total = eye(), []
+    for degrees in (0.0, 10.0, 20.0, 60.0):
+        halo = unit.lit.look(place(20.0), off(degrees)).received.halo_w_m2[lamp]
+        total.append(float(halo + beam_of(unit, 20.0, degrees).light_w_m2.sum()))
     assert all(one > 2.0 * other > 0.0 for one, other in itertools.pairwise(total))
-    view = eye(NO_SCATTERING).lit.look(place(20.0), off(20.0))
-    assert view.received.halo_w_m2[lamp] == 0.0
-    assert view.beam.light_w_m2.max() == 0.0
+    clear = eye(NO_SCATTERING)
+    assert clear.lit.look(place(20.0), off(20.0)).received.halo_w_m2[lamp] == 0.0
+    assert beam_of(clear, 20.0, 20.0).light_w_m2.max() == 0.0
 
 
 def test_beam_turns_counter_clockwise():
     unit = eye()
-    lamp = unit.lit.rotating.lamp
+    lamp = lamp_of(unit)
     times = np.arange(0.0, 2.0, 0.02)
     for bearing in (1.2, -2.5, math.pi):
         halo = [unit.lit.look(place(15.0, bearing), float(t)).received.halo_w_m2[lamp] for t in times]
@@ -120,12 +135,12 @@ def test_streak_fades_with_distance_and_along_itself():
 def test_image_holds_the_light_of_the_pieces():
     """Electrons on the sensor of a beam far from the border: the light of its pieces that lie within the image."""
     unit = eye()
-    view = unit.lit.look(place(4.0), off(150.0))
+    beam = beam_of(unit, 4.0, 150.0)
     image = streak(unit, 4.0, 150.0)
     factor2 = unit.lit.lens.factor**2
-    inside = np.abs(view.beam.rays_camera[:, 0] / view.beam.rays_camera[:, 2]) < math.tan(math.radians(40.0))
-    channel = unit.lit.lights.electrons_per_j[unit.lit.rotating.lamp, 2] * unit.lit.lens.aperture_m2
-    expected = channel * float(view.beam.light_w_m2[inside].sum())
+    inside = np.abs(beam.rays_camera[:, 0] / beam.rays_camera[:, 2]) < math.tan(math.radians(40.0))
+    channel = unit.lit.lights.electrons_per_j[lamp_of(unit), 2] * unit.lit.lens.aperture_m2
+    expected = channel * float(beam.light_w_m2[inside].sum())
     assert image.sum() * factor2 == pytest.approx(expected, rel=0.15)
 
 
@@ -145,7 +160,7 @@ def test_facing_beam_is_round_and_one_beside_is_long():
 def test_long_exposure_averages_the_turn():
     """The mean over the exposure of the light at many instants, to 1 % at the default rate and 16 ms."""
     unit = eye()
-    lamp = unit.lit.rotating.lamp
+    lamp = lamp_of(unit)
     for degrees in (0.0, 6.0):
         middle = off(degrees)
         received = unit.lit.look(place(15.0), middle, exposure_s=0.016).received
@@ -157,7 +172,7 @@ def test_long_exposure_averages_the_turn():
 def test_mirror_image_shines_when_the_beacon_does():
     nuisance = NuisanceCfg(surface_reflection="severe")
     unit = eye(nuisance=nuisance)
-    lamp, image = unit.lit.rotating.lamp, unit.lit.lights.count - 1
+    lamp, image = lamp_of(unit), unit.lit.lights.count - 1
     facing = unit.lit.look(place(25.0), off(0.0)).received
     aside = unit.lit.look(place(25.0), off(60.0)).received
     assert facing.halo_w_m2[lamp] > 30.0 * aside.halo_w_m2[lamp] > 0.0
@@ -169,7 +184,7 @@ def test_mirror_image_shines_when_the_beacon_does():
 def test_elevation_lifts_the_beam():
     tilted = dataclasses.replace(BEACON, elevation_deg=20.0)
     unit = eye(beacon=tilted)
-    lamp = unit.lit.rotating.lamp
+    lamp = lamp_of(unit)
     up = 15.0 * math.tan(math.radians(20.0))
     high = unit.lit.look(place(15.0, up_m=up), 0.0).received
     level = unit.lit.look(place(15.0), 0.0).received
