@@ -117,6 +117,8 @@ class BeaconState(NamedTuple):
         range_sigma_m: standard deviation along the line of sight as of the last fix.
         cross_sigma_m: standard deviation across it.
         finest_rad: least standard deviation of the fixes that the bank rests on.
+        mean_m: mean of the bank's places, as of the last fix.
+        axis_yaw_rad: mean compass yaw of the station's x axis, in (-π, π].
     """
 
     bank: tuple[Hypothesis, ...]
@@ -130,20 +132,13 @@ class BeaconState(NamedTuple):
     range_sigma_m: float = math.inf
     cross_sigma_m: float = math.inf
     finest_rad: float = math.inf
+    mean_m: tuple[float, float] = (0.0, 0.0)
+    axis_yaw_rad: float = 0.0
 
     @property
     def offset_m(self) -> tuple[float, float]:
         """Mean of the beacon's place relative to the camera, compass axes."""
-        x = sum(h.weight * h.mean[0] for h in self.bank) - self.moved_m[0]
-        y = sum(h.weight * h.mean[1] for h in self.bank) - self.moved_m[1]
-        return x, y
-
-    @property
-    def axis_yaw_rad(self) -> float:
-        """Mean compass yaw of the station's x axis, in (-π, π]."""
-        first = self.bank[0].mean[2]
-        spread = sum(h.weight * math.remainder(h.mean[2] - first, math.tau) for h in self.bank)
-        return math.remainder(first + spread, math.tau)
+        return self.mean_m[0] - self.moved_m[0], self.mean_m[1] - self.moved_m[1]
 
     @property
     def range_m(self) -> float:
@@ -164,7 +159,7 @@ class BeaconState(NamedTuple):
     @property
     def covariance(self) -> Array:
         """(3, 3) of (b_x, b_y, ψ_s) over the whole bank, as of the last fix."""
-        mean = np.array([self.offset_m[0] + self.moved_m[0], self.offset_m[1] + self.moved_m[1], self.axis_yaw_rad])
+        mean = np.array([*self.mean_m, self.axis_yaw_rad])
         total = np.zeros((3, 3))
         for h in self.bank:
             gap = np.array(h.mean) - mean
@@ -225,8 +220,8 @@ class BeaconFilter:
         covariance = np.diag([sigma_m**2, sigma_m**2, _POSE_SIGMA_RAD**2])
         mean = (offset_m[0], offset_m[1], axis_yaw_rad)
         bank = (Hypothesis(1.0, mean, covariance),)
-        state = BeaconState(bank, (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2, sigma_m, sigma_m)
-        return state._replace(finest_rad=_POSE_SIGMA_RAD)
+        state = BeaconState(bank, (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2)
+        return _measured(state._replace(finest_rad=_POSE_SIGMA_RAD))
 
     def predict(self, state: BeaconState, ground_compass_m_s: tuple[float, float]) -> BeaconState:
         """Dead reckoning over one control period with the velocity over ground in level compass axes."""
@@ -293,7 +288,13 @@ class BeaconFilter:
 
 
 def _measured(state: BeaconState) -> BeaconState:
-    """The state with its uncertainty along and across the line of sight; worked out once a fix, being often asked."""
+    """The state with the bank's moments; worked out once a fix, since they are asked for in every control period."""
+    first = state.bank[0].mean[2]
+    turned = sum(h.weight * math.remainder(h.mean[2] - first, math.tau) for h in state.bank)
+    state = state._replace(
+        mean_m=(sum(h.weight * h.mean[0] for h in state.bank), sum(h.weight * h.mean[1] for h in state.bank)),
+        axis_yaw_rad=math.remainder(first + turned, math.tau),
+    )
     x, y = state.offset_m
     length = math.hypot(x, y)
     if length < 1e-6:
