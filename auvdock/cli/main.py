@@ -37,6 +37,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
     ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
+    ("fit-landing",): (
+        "auvdock.cli.fit_landing:run",
+        "fit the beacons fidelity of a landing to detectors of lights and tags",
+    ),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),
 }
 """Words of a command: where it lives (imported only when asked for) and what it does."""

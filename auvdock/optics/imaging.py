@@ -126,7 +126,9 @@ class UnderwaterCamera:
         solid = self.lit.lens.solid_angle_sr.astype(np.float32)
         self._solid_angle = solid[:, :, None]
         self._beam_image: BeamImage | None = None
-        self._buffer = np.empty((camera.height_px, camera.width_px, 3), dtype=np.float32)
+        lens = self.lit.lens
+        # Enlarged coarse pixels may reach over the image's right and lower edge.
+        self._whole = np.empty((lens.shape[0] * lens.factor, lens.shape[1] * lens.factor, 3), dtype=np.float32)
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator) -> None:
@@ -179,6 +181,11 @@ class UnderwaterCamera:
         level = SensorScale(self._cfg, 1.0).saturated_e
         self.exposure.settle(lambda s: 1.0 - float(np.searchsorted(bright, level / s)) / bright.size)
 
+    @property
+    def _buffer(self) -> NDArray[np.float32]:
+        """(H, W, 3) the image's part of what is drawn on; a view, made anew since pickling would part the two."""
+        return self._whole[: self._camera.height_px, : self._camera.width_px]
+
     def electrons(self, view: View, exposure_s: float, gain: float = 1.0) -> NDArray[np.float32]:
         """Mean photo-electrons (H, W, 3), red, green, blue, without noise; valid until the next call."""
         lens = self.lit.lens
@@ -187,8 +194,6 @@ class UnderwaterCamera:
         coarse = self._lights.coarse(received, lit, exposure_s)
         if view.beam is not None and self._beam_image is not None:
             self._beam_image.add(coarse, view.beam, exposure_s)
-        size = (self._camera.width_px, self._camera.height_px)
-        fine_size = (lens.shape[1] * lens.factor, lens.shape[0] * lens.factor)
         surfaces = self._surfaces
         depth_m = -float(view.T_world_camera[2, 3])
         drawn: NDArray[np.float32] | None = None
@@ -206,11 +211,7 @@ class UnderwaterCamera:
                 even = (self.lit.electrons_per_j @ veil * exposure_s).astype(np.float32) * self._solid_angle
                 image += even
                 drawn = even
-        if fine_size == size:
-            cv2.resize(image, size, self._buffer, interpolation=cv2.INTER_LINEAR)
-        else:
-            whole = cv2.resize(image, fine_size, interpolation=cv2.INTER_LINEAR)
-            self._buffer[:] = whole[: size[1], : size[0]]
+        cv2.resize(image, self._whole.shape[1::-1], self._whole, interpolation=cv2.INTER_LINEAR)
         if self.tag is not None:
             self.tag.add(self._buffer, view.T_world_camera, exposure_s, drawn, hidden=self._hidden)
         near, shown = lens.locate(received.ray_camera, self._lights.reach_px)

@@ -23,7 +23,7 @@ _NO_MAP: NDArray[np.float32] = np.empty(0, dtype=np.float32)
 _PAD_PX = 5
 _TEXEL_PX = 0.8
 """Distance of the texture's texels in pixels."""
-_KNOTS = 9
+_KNOTS = 7
 _COVER = 0.25
 """Reflectance of what covers a hidden tag: grey silt."""
 
@@ -89,8 +89,8 @@ class TagImage:
         target = image[y0:y1, x0:x1]
         if surfaces is not None:
             veil -= self._enlarged(surfaces, region)
-        target += cv2.multiply(unit, cv2.merge([share, share, share]))
-        target += cv2.multiply(veil, cv2.merge([cover, cover, cover]))
+        cv2.accumulateProduct(unit, cv2.merge([share, share, share]), target)
+        cv2.accumulateProduct(veil, cv2.merge([cover, cover, cover]), target)
 
     def _lens_map(self) -> NDArray[np.float32]:
         """(H, W, 2) tangents of the ray through each pixel."""

@@ -59,6 +59,9 @@ class AprilTagDetector:
         # A tag in haze has little contrast: OpenCV's 7 levels would drown it.
         settings.adaptiveThreshConstant = 3
         settings.minMarkerPerimeterRate = 0.05
+        # The white margin's outline runs one cell outside the black square: at OpenCV's 0.125 of the side the two count
+        # as one candidate, and of a tag turned by some 30° the outer one is often kept, which holds no code.
+        settings.minMarkerDistanceRate = 0.01
         self._detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(_FAMILY), settings)
 
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
