@@ -15,7 +15,13 @@ from landing_bench import BLIND, CAMERAS, PILOTS, STATION, Lander, fly, glance_o
 
 from auvdock.controllers.landing.config import HoverAllocationCfg, LandingControlCfg
 from auvdock.controllers.landing.guidance import LandingGuidanceCfg, Place, corridor_m, sink_m_s, station_keeping
-from auvdock.controllers.landing.modes import LANDING_MODES, LANDING_TRANSITIONS, LandingModeCfg
+from auvdock.controllers.landing.modes import (
+    LANDING_MODES,
+    LANDING_TRANSITIONS,
+    LandingFacts,
+    LandingModeCfg,
+    next_landing_mode,
+)
 from auvdock.controllers.landing.pilot import LandingPilot
 from auvdock.controllers.landing.search import SpiralCfg, spiral, spiral_pass
 from auvdock.core.contracts import Bearing, PoseEstimate, Proprioception
@@ -242,6 +248,72 @@ def test_whatever_comes_in_commands_stay_finite_and_modes_on_documented_edges(se
         assert after.mode in LANDING_TRANSITIONS[state.mode]
         assert not latched or (command.mode == "docked" and not command.values.any())
         state, now = after, now + pause
+
+
+CENTRED = LandingFacts(
+    latched=False,
+    fixes=50,
+    since_fix_s=0.0,
+    lost=False,
+    jumped=False,
+    sigma_m=0.005,
+    height_m=1.0,
+    offset_m=0.01,
+    heading_error_rad=0.01,
+    allowed_m=0.15,
+    sights=0,
+    since_sight_s=math.inf,
+    in_mode_s=1.0,
+    inside_s=5.0,
+    stalled_s=0.0,
+    giving_up=False,
+)
+
+
+@pytest.mark.parametrize(
+    ("mode", "changes", "after"),
+    [
+        ("search", {}, "approach"),
+        ("search", {"fixes": 0, "since_fix_s": math.inf}, "search"),
+        ("search", {"fixes": 0, "since_fix_s": math.inf, "sights": 3, "since_sight_s": 0.0}, "approach"),
+        ("search", {"fixes": 0, "since_fix_s": math.inf, "in_mode_s": 1e3}, "abort"),
+        ("approach", {"height_m": 2.2}, "align"),
+        ("approach", {"height_m": 4.0}, "approach"),
+        ("approach", {"since_fix_s": 4.0}, "search"),
+        ("align", {}, "descend"),
+        ("align", {"inside_s": 1.0}, "align"),
+        ("align", {"sigma_m": 0.2}, "align"),
+        ("align", {"since_fix_s": 4.0}, "abort"),
+        ("align", {"since_fix_s": 4.0, "height_m": 2.0}, "search"),
+        ("align", {"lost": True}, "abort"),
+        ("align", {"offset_m": 1.5}, "approach"),
+        ("descend", {"offset_m": 0.2}, "descend"),
+        ("descend", {"offset_m": 0.3}, "align"),
+        ("descend", {"since_fix_s": 2.0}, "descend"),
+        ("descend", {"since_fix_s": 4.0}, "abort"),
+        ("descend", {"lost": True}, "abort"),
+        ("descend", {"jumped": True}, "abort"),
+        ("descend", {"stalled_s": 3.0}, "abort"),
+        ("descend", {"height_m": 0.3, "allowed_m": 0.06, "since_fix_s": 5.0, "lost": True}, "descend"),
+        ("descend", {"height_m": 0.3, "allowed_m": 0.06, "since_fix_s": 11.0}, "abort"),
+        ("descend", {"height_m": 0.3, "allowed_m": 0.06, "sigma_m": 0.05}, "abort"),
+        ("descend", {"height_m": 0.1, "allowed_m": 0.04}, "touchdown"),
+        ("descend", {"height_m": 0.1, "allowed_m": 0.04, "offset_m": 0.05}, "descend"),
+        ("touchdown", {"height_m": 0.0, "allowed_m": 0.03}, "touchdown"),
+        ("touchdown", {"height_m": 0.2, "allowed_m": 0.05, "stalled_s": 3.0}, "abort"),
+        ("touchdown", {"height_m": 0.0, "allowed_m": 0.03, "stalled_s": 3.0}, "touchdown"),
+        ("touchdown", {"height_m": -0.2, "allowed_m": 0.03}, "abort"),
+        ("touchdown", {"height_m": 0.0, "allowed_m": 0.03, "in_mode_s": 13.0}, "abort"),
+        ("abort", {}, "abort"),
+        ("abort", {"height_m": 2.0}, "approach"),
+        ("abort", {"height_m": 2.0, "since_fix_s": 9.0}, "search"),
+        ("abort", {"height_m": 2.0, "giving_up": True}, "abort"),
+        ("docked", {}, "docked"),
+    ],
+)
+def test_mode_table(mode, changes, after):
+    assert next_landing_mode(mode, CENTRED._replace(**changes), MODES) == after
+    assert next_landing_mode(mode, CENTRED._replace(**{**changes, "latched": True}), MODES) == "docked"
 
 
 def test_corridor_narrows_and_sinking_stops_at_its_edge():
