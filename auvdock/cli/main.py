@@ -35,6 +35,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.reproduce_rotating:run_rotating_docking",
         "docking by the rotating beacon, with and without it",
     ),
+    ("reproduce", "landing-trials"): (
+        "auvdock.cli.landing_trials:run_landing_trials",
+        "paper C's ten landings beside ours, each level alone and both",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("fit-landing",): (

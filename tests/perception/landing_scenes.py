@@ -71,8 +71,8 @@ class Senses:
 
     descent: Descent
     rng: np.random.Generator
-    light_sigma_px: float = 0.15
-    tag_sigma_px: float = 0.1
+    light_sigma_px: float = 0.05
+    tag_sigma_px: float = 0.05
     sensors: Sensors = field(default_factory=lambda: Sensors(SensorCfg()))
 
     def __post_init__(self) -> None:

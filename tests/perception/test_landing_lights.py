@@ -40,7 +40,7 @@ def sight(seed: int, tilt_error_deg: float = 0.2, heading_error_deg: float = 1.0
     return T, attitude, CAMERA.project(q), float(T[2, 3] + rng.normal(0.0, 0.03))
 
 
-def seen(pixels: Array, rng: np.random.Generator, stray: int = 0, sigma_px: float = 0.15) -> Detections:
+def seen(pixels: Array, rng: np.random.Generator, stray: int = 0, sigma_px: float = 0.05) -> Detections:
     """Noisy pixels and strays, shuffled."""
     spots = np.vstack([pixels + rng.normal(0.0, sigma_px, pixels.shape), rng.uniform(0.0, (800.0, 600.0), (stray, 2))])
     spots = spots[rng.permutation(len(spots))]

@@ -39,9 +39,10 @@ class AttitudeCfg:
 class LightLevelCfg:
     """Level I: the lights."""
 
-    centre_sigma_px: float = 0.15
-    """Standard deviation of a small light's centre, per axis; ours, from rendered frames with a margin of two."""
-    centre_sigma_widths: float = 0.005
+    centre_sigma_px: float = 0.05
+    """Standard deviation of a small light's centre, per axis; ours. Rendered frames give 0.01 px to 0.02 px; no
+    calibration in water is better than this."""
+    centre_sigma_widths: float = 0.002
     """In addition this share of the box's width: the halo of a near light is not round (paper C, section 2.2)."""
     max_reprojection_px: float = 2.0
     """A mean reprojection error above this, in units of σ where that is above 1 px, means wrong identities."""

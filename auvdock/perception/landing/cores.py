@@ -79,12 +79,15 @@ class CoreDetector:
 
     def _detect(self, image: Image) -> Detections:
         cfg = self._cfg
-        level = _mean_channel(image)
-        small = np.asarray(cv2.resize(level, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        half = cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        small = _mean_channel(np.asarray(half, dtype=np.uint8))
         base, peak = float(np.median(small[::2, ::2])), float(small.max())
-        sigma = noise_sigma(level)
+        sigma = noise_sigma(small)
         if peak - base < max(cfg.min_contrast, 8.0 * sigma):
             return Detections.empty()
+        left, top, right, bottom = _bounds(small, base + cfg.levels[-1] * (peak - base))
+        height, width = small.shape
+        small = np.ascontiguousarray(small[top:bottom, left:right])
         taken = np.zeros(small.shape, dtype=np.uint8)
         boxes: list[Array] = []
         centres: list[Array] = []
@@ -99,17 +102,18 @@ class CoreDetector:
                 if label in old or area < cfg.min_area_px:
                     continue
                 part = labels[y : y + h, x : x + w] == label
-                top = float(small[y : y + h, x : x + w][part].max())
-                if share < cfg.levels[0] and top - cut < cfg.prominence * (peak - base):
+                highest = float(small[y : y + h, x : x + w][part].max())
+                if share < cfg.levels[0] and highest - cut < cfg.prominence * (peak - base):
                     continue
                 taken[y : y + h, x : x + w][part] = 1
-                cut_off = x == 0 or y == 0 or x + w == small.shape[1] or y + h == small.shape[0]
+                x, y = x + left, y + top
+                cut_off = x == 0 or y == 0 or x + w == width or y + h == height
                 if cut_off or max(w, h) > cfg.max_aspect * min(w, h) + 2.0:
                     continue
                 box = np.array([x, y, x + w, y + h]) * 2
-                centres.append(_centre(level, box, cut))
+                centres.append(_centre(image, box, cut))
                 boxes.append(box - 0.5)
-                peaks.append(top - base)
+                peaks.append(highest - base)
             if len(peaks) >= cfg.max_lights:
                 break
         return _detections(image, boxes, centres, np.array(peaks) / sigma, cfg.max_lights)
@@ -121,13 +125,22 @@ def _mean_channel(image: Image) -> Image:
     return np.asarray(cv2.GaussianBlur(mean, (3, 3), 0.8), dtype=np.uint8)
 
 
-def _centre(level: Image, box: IntArray, cut: float) -> Array:
+def _bounds(level: Image, cut: float) -> tuple[int, int, int, int]:
+    """(left, top, right, bottom) of what is above a cut, two pixels wider."""
+    _, mask = cv2.threshold(level, cut, 255, cv2.THRESH_BINARY)
+    x, y, w, h = cv2.boundingRect(mask)
+    return max(x - 2, 0), max(y - 2, 0), x + w + 2, y + h + 2
+
+
+def _centre(image: Image, box: IntArray, cut: float) -> Array:
     """(2,) centroid of what closes within a box and a border of a few pixels, or at least of what is above the cut."""
     x0, y0 = np.maximum(box[:2] - _BORDER_PX, 0).tolist()
-    patch = level[y0 : box[3] + _BORDER_PX, x0 : box[2] + _BORDER_PX].astype(np.float64)
+    patch = _mean_channel(image[y0 : box[3] + _BORDER_PX, x0 : box[2] + _BORDER_PX]).astype(np.float64)
     rim = max(patch[0].max(), patch[-1].max(), patch[:, 0].max(), patch[:, -1].max())
     weight = np.maximum(patch - min(float(rim), cut), 0.0)
     total = float(weight.sum())
+    if not total > 0.0:
+        return 0.5 * (box[:2] + box[2:] - 1.0)
     column = float(weight.sum(axis=0) @ np.arange(weight.shape[1])) / total
     row = float(weight.sum(axis=1) @ np.arange(weight.shape[0])) / total
     return np.array([x0 + column, y0 + row])

@@ -19,7 +19,7 @@ __all__ = ["TagLevel", "tag_corners_m"]
 
 _SURE = 25.0
 """χ² of a pose that needs no rival: eight residuals and three of attitude, less six unknowns."""
-_MARGIN = 0.6
+_MARGIN = 0.3
 _MARGIN_PX = 12.0
 
 

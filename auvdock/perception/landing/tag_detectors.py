@@ -22,8 +22,10 @@ _FAMILY = cv2.aruco.DICT_APRILTAG_36h11
 _CELLS = 8
 _CODE = 6
 _MIN_REGION_PX = 12
-_SMALL_PX = 160
+_SMALL_PX = 120
 """A region below this is enlarged twice before it is searched: cells of two pixels are not read reliably."""
+_READ_PX = 200.0
+"""Side of a region that is enough to read the tag in it: cells of some 15 pixels."""
 
 
 class TagDetector(Protocol):
@@ -54,7 +56,7 @@ class AprilTagDetector:
         """Set OpenCV's detector up."""
         settings = cv2.aruco.DetectorParameters()
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
-        settings.adaptiveThreshWinSizeMin, settings.adaptiveThreshWinSizeMax = 5, 45
+        settings.adaptiveThreshWinSizeMin, settings.adaptiveThreshWinSizeMax = 9, 29
         settings.adaptiveThreshWinSizeStep = 20
         # A tag in haze has little contrast: OpenCV's 7 levels would drown it.
         settings.adaptiveThreshConstant = 3
@@ -68,18 +70,28 @@ class AprilTagDetector:
         """Detect in the whole frame, or only in the given regions when there are any."""
         found: list[TagDetection] = []
         for patch, origin in _patches(frame, regions):
-            scale = 2.0 if min(patch.shape) < _SMALL_PX else 1.0
-            searched = cv2.resize(patch, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_CUBIC) if scale > 1.0 else patch
-            corners, ids, _ = self._detector.detectMarkers(searched)
-            # Without a tag `ids` may be None, which OpenCV's stubs do not say; `corners` is then empty.
-            numbers = np.asarray(ids).ravel()
-            for index, quad in enumerate(corners):
-                # Pixel centres have integer coordinates, enlarged ones lie between.
-                rough = (np.asarray(quad, dtype=np.float64).reshape(4, 2) + 0.5) / scale - 0.5 + origin
-                refined = refined_corners(frame, rough)
-                if refined is not None:
-                    found.append(TagDetection(int(numbers[index]), *refined))
+            for scale in _scales(min(patch.shape), bool(regions)):
+                tags = self._search(frame, patch, origin, scale)
+                if tags:
+                    found.extend(tags)
+                    break
         return tuple(found)
+
+    def _search(self, frame: Frame, patch: Image, origin: Array, scale: float) -> list[TagDetection]:
+        """Tags of one patch, searched at a scale; their corners are of the full resolution all the same."""
+        method = cv2.INTER_CUBIC if scale > 1.0 else cv2.INTER_AREA
+        searched = patch if scale == 1.0 else cv2.resize(patch, None, fx=scale, fy=scale, interpolation=method)
+        corners, ids, _ = self._detector.detectMarkers(searched)
+        # Without a tag `ids` may be None, which OpenCV's stubs do not say; `corners` is then empty.
+        numbers = np.asarray(ids).ravel()
+        found: list[TagDetection] = []
+        for index, quad in enumerate(corners):
+            # Pixel centres have integer coordinates; those of another scale lie between.
+            rough = (np.asarray(quad, dtype=np.float64).reshape(4, 2) + 0.5) / scale - 0.5 + origin
+            refined = refined_corners(frame, rough)
+            if refined is not None:
+                found.append(TagDetection(int(numbers[index]), *refined))
+        return found
 
 
 class ContourTagDetector:
@@ -124,6 +136,19 @@ class ContourTagDetector:
             return None
         read, number, turns = self._family.identify(np.ascontiguousarray(bits[1 : 1 + _CODE, 1 : 1 + _CODE]), 0.6)
         return (int(number), int(turns)) if read else None
+
+
+def _scales(side_px: int, is_region: bool) -> tuple[float, ...]:
+    """Scales at which to search a patch, one after the other until a tag is found.
+
+    A region holds a tag of about half its side, and some 120 pixels of it are enough to read; a whole frame may hold
+    one of any size.
+    """
+    if side_px < _SMALL_PX:
+        return (2.0, 1.0) if is_region else (2.0,)
+    if not is_region:
+        return (0.5, 1.0)
+    return (_READ_PX / side_px, 1.0) if side_px > 1.5 * _READ_PX else (1.0,)
 
 
 def _patches(frame: Frame, regions: Sequence[RegionOfInterest]) -> list[tuple[Image, Array]]:

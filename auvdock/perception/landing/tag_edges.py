@@ -18,9 +18,11 @@ _CELLS = 8
 """Cells along a side of the black square: six of code and a border at each end."""
 _FROM, _TO = 0.08, 0.92
 """Part of each side that is used: blur rounds the corners."""
-_STEP_PX = 0.25
+_STEP_PX = 0.4
 _AROUND_PX = 12
 _PASSES = 2
+_CLOSE_PX = 1.0
+"""Corners that moved less need no second pass: the profiles were centred well enough."""
 _FLOOR_PX = 0.03
 """Least standard deviation of a corner, ours: interpolation and blur that differs on the two sides of an edge."""
 
@@ -56,7 +58,10 @@ def refined_corners(frame: Frame, corners_px: Array) -> tuple[Array, float] | No
         found = corners_from_lines(lines, camera)
         if found is None:
             return None
+        moved = float(np.abs(found - corners).max())
         corners = found
+        if moved < _CLOSE_PX:
+            break
     focal = float(camera.matrix[0, 0])
     return corners, math.hypot(_FLOOR_PX, focal * math.sqrt(variance))
 
@@ -94,13 +99,15 @@ def line_through(points: Array) -> tuple[Array, Array, float, int] | None:
 
 
 def _light_around(frame: Frame, corners_px: Array) -> tuple[NDArray[np.float32], Array]:
-    """(linear light (h, w) around the corners, (2,) the patch's first column and row)."""
+    """(linear light (h, w) of the brightest channel around the corners, (2,) the patch's first column and row)."""
     height, width = frame.image.shape[:2]
     x0, y0 = np.maximum(np.floor(corners_px.min(axis=0)).astype(int) - _AROUND_PX, 0).tolist()
     x1, y1 = (np.ceil(corners_px.max(axis=0)).astype(int) + _AROUND_PX + 1).tolist()
-    patch = np.ascontiguousarray(frame.image[y0 : min(y1, height), x0 : min(x1, width)])
-    electrons = cv2.LUT(patch, frame.response.electrons(frame.gain).astype(np.float32))
-    return np.asarray(electrons, dtype=np.float32).sum(axis=2), np.array([float(x0), float(y0)])
+    patch = frame.image[y0 : min(y1, height), x0 : min(x1, width)]
+    channel = int(np.argmax(patch[::8, ::8].reshape(-1, 3).sum(axis=0, dtype=np.int64)))
+    codes = np.ascontiguousarray(patch[:, :, channel])
+    light = cv2.LUT(codes, frame.response.electrons(frame.gain).astype(np.float32))
+    return np.asarray(light, dtype=np.float32), np.array([float(x0), float(y0)])
 
 
 def _edge_points(light: NDArray[np.float32], origin: Array, start: Array, end: Array) -> Array | None:
@@ -117,8 +124,8 @@ def _edge_points(light: NDArray[np.float32], origin: Array, start: Array, end: A
     base = start + np.linspace(_FROM, _TO, count)[:, None] * side
     offset = np.arange(-reach, reach + 0.5 * _STEP_PX, _STEP_PX)
     where = base[:, None, :] + offset[:, None] * outward - origin
-    low, high = where.min(axis=(0, 1)), where.max(axis=(0, 1))
-    if low.min() < 0.0 or high[0] > light.shape[1] - 1 or high[1] > light.shape[0] - 1:
+    ends = where[[0, 0, -1, -1], [0, -1, 0, -1]]
+    if ends.min() < 0.0 or ends[:, 0].max() > light.shape[1] - 1 or ends[:, 1].max() > light.shape[0] - 1:
         return None
     at = where.astype(np.float32)
     profile = cv2.remap(light, at[:, :, 0], at[:, :, 1], cv2.INTER_LINEAR)
