@@ -13,7 +13,7 @@ from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.transforms import invert, make_transform
 from auvdock.perception.landing.config import LightLevelCfg
 from auvdock.perception.landing.identity import hypotheses, match
-from auvdock.perception.landing.level import LevelPose, LevelSolver
+from auvdock.perception.landing.level import LevelPose, LevelSolver, pose_offset
 from auvdock.perception.rpnp import rpnp_poses
 
 __all__ = ["LightLevel", "NamedLights"]
@@ -23,6 +23,8 @@ _MAX_ROTATION_RAD = 0.6
 _GATE_PX = 3.0
 _BETTER = 9.0
 """χ² by which one naming must beat another that names as many lights."""
+_FAR = 50.0
+"""Squared Mahalanobis distance; beyond the filter's own gate, which comes after and counts its refusals."""
 _WIDE_HEIGHT_M = (0.1, 30.0)
 _Start = tuple[Array, str]
 """A pose to refine and where it comes from."""
@@ -125,10 +127,16 @@ class LightLevel:
         gate = np.where(view, np.minimum(_GATE_PX + 4.0 * spread, self._cfg.gate_px), -1.0)
         spot = match(image, detections.centre_px[index], gate)
         named = np.where(spot >= 0, index[spot], -1)
-        return self._solve(detections, named, attitude, (T_station_camera, "tracked"))
+        return self._solve(detections, named, attitude, (T_station_camera, "tracked"), covariance)
 
-    def _solve(self, detections: Detections, named: IntArray, attitude: Array, start: _Start) -> NamedLights | None:
-        """The pose of the named lights; if they fit none, that of most of them that does, three at least."""
+    def _solve(
+        self, detections: Detections, named: IntArray, attitude: Array, start: _Start, spread: Array | None = None
+    ) -> NamedLights | None:
+        """The pose of the named lights; if they fit none, that of most of them that does, three at least.
+
+        With `spread`, the covariance of the start, a pose far from the start does not fit: three spots that are not
+        the lights may image some pose well.
+        """
         lights = np.flatnonzero(named >= 0)
         for left_out in range(max(len(lights) - _MIN_LIGHTS, 0) + 1):
             best: NamedLights | None = None
@@ -136,7 +144,9 @@ class LightLevel:
                 fewer = named.copy()
                 fewer[list(out)] = -1
                 found = self._refined(detections, fewer, attitude, start)
-                if found is not None and (best is None or found.pose.cost < best.pose.cost):
+                if found is None or (spread is not None and _far(found.pose, start[0], spread)):
+                    continue
+                if best is None or found.pose.cost < best.pose.cost:
                     best = found
             if best is not None:
                 return best
@@ -177,6 +187,12 @@ class LightLevel:
     def _sigma_px(self, detections: Detections, index: IntArray) -> Array:
         width = detections.xyxy[index, 2:] - detections.xyxy[index, :2]
         return np.hypot(self._cfg.centre_sigma_px, self._cfg.centre_sigma_widths * width.mean(axis=1))
+
+
+def _far(pose: LevelPose, T_expected: Array, covariance: Array) -> bool:
+    """Whether a pose contradicts what was expected."""
+    offset = pose_offset(T_expected, pose.T_station_camera)
+    return float(offset @ np.linalg.solve(covariance + pose.estimate.covariance, offset)) > _FAR
 
 
 def _apart(a: NamedLights, b: NamedLights) -> bool:
