@@ -48,6 +48,7 @@ class PoolRig:
         beacon: RotatingBeaconCfg | None = None,
         water: WaterCfg | None = None,
         nuisance: NuisanceCfg | None = None,
+        lamps: tuple[BeaconCfg, ...] = (),
     ) -> None:
         """Set the rig up.
 
@@ -57,9 +58,11 @@ class PoolRig:
             beacon: by default the paper's, in the origin.
             water: by default the paper's.
             nuisance: further nuisances; its daylight is replaced.
+            lamps: steady lamps beside the beacon.
         """
         self.beacon = beacon if beacon is not None else RotatingBeaconCfg(position_m=(0.0, 0.0, 0.0))
         self.camera_cfg = camera if camera is not None else CameraCfg(width_px=1920, height_px=1080)
+        self.layout = _no_array(lamps)
         level = "mild" if day else "none"
         parts = nuisance if nuisance is not None else NuisanceCfg()
         self.camera: Camera = make_camera(
@@ -68,7 +71,7 @@ class PoolRig:
         self.imager = UnderwaterCamera(
             self.camera,
             water if water is not None else load_water("pool"),
-            _no_array(),
+            self.layout,
             NuisanceCfg(
                 parts.flicker, parts.marine_snow, parts.interfering_lights, parts.surface_reflection, daylight=level
             ),
@@ -203,10 +206,11 @@ def flash_visibility(
     return Visibility(x_m, y_m, day, arc, float(seen[facing].mean()), arc / frame_deg)
 
 
-def _no_array() -> BeaconLayout:
+def _no_array(lamps: tuple[BeaconCfg, ...]) -> BeaconLayout:
     """A layout must have an array: four lamps of a nanowatt, a kilometre away."""
     return BeaconLayout(
-        tuple(
+        lamps
+        + tuple(
             BeaconCfg(f"B{k}", "array", (900.0, float(k), 0.0), (1.0, 0.0, 0.0), 450.0, 1e-9, 0.35, 45.0)
             for k in range(4)
         )

@@ -31,6 +31,14 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.plan_design:run_guidance_design",
         "optimised arrays against paper A's ring of six",
     ),
+    ("reproduce", "azimuth"): (
+        "auvdock.cli.reproduce_beacon:run_azimuth",
+        "paper B's azimuth errors beside its method here and ours",
+    ),
+    ("reproduce", "deviation"): (
+        "auvdock.cli.reproduce_beacon:run_deviation",
+        "paper B's deviation-angle errors beside its method here and ours",
+    ),
     ("reproduce", "rotating-docking"): (
         "auvdock.cli.reproduce_rotating:run_rotating_docking",
         "docking by the rotating beacon, with and without it",

@@ -97,12 +97,12 @@ class Candidate:
         self.last_seen_s, self.ray_compass, self.hits = time_s, ray_compass, self.hits + 1
         self._forget(time_s - keep_s)
 
-    def share(self, time_s: float, spot: Spot | None, keep_s: float) -> None:
+    def share(self, time_s: float, spot: Spot | None, ray_compass: Array | None, keep_s: float) -> None:
         """One frame with the light in view and no spot of its own: not found, or part of another light's `spot`."""
         self.times_s.append(time_s)
         self.flux.append(spot.flux if spot is not None else 0.0)
         self.seen.append(spot is not None)
-        self.rays.append(self.ray_compass if spot is not None else None)
+        self.rays.append(ray_compass)
         self.scores.append(spot.score if spot is not None else 0.0)
         self._forget(time_s - keep_s)
 
@@ -157,6 +157,7 @@ class Candidates:
         """
         self._cfg, self._camera, self._turn_s = cfg, camera, turn_s
         self._gate_cosine = math.cos(math.radians(cfg.gate_deg))
+        self._flash_cosine = math.cos(math.radians(cfg.flash_deg))
         self._merge_cosine = math.cos(math.radians(cfg.merge_deg))
         self.all: list[Candidate] = []
 
@@ -204,7 +205,10 @@ class Candidates:
             elif visible:
                 # Two lights that melt into one from time to time share its brightness then.
                 shared = self._nearest(candidate, rays)
-                candidate.share(place.time_s, None if shared is None else spots[shared], keep_s)
+                if shared is None:
+                    candidate.share(place.time_s, None, None, keep_s)
+                else:
+                    candidate.share(place.time_s, spots[shared], rays[shared], keep_s)
         for index, spot in enumerate(spots):
             if index in owner or index in parts or len(self.all) - len(owner) > 2 * cfg.max_candidates:
                 continue
@@ -242,8 +246,12 @@ class Candidates:
         return any(c is not beacon and c.hits >= _KNOWN and float(ray @ c.ray_compass) > gate for c in self.all)
 
     def _nearest(self, candidate: Candidate, rays: list[Array]) -> int | None:
-        """The spot within the merging distance of a candidate that has none of its own."""
-        best, index = self._merge_cosine, None
+        """The spot that a candidate without one of its own may be part of.
+
+        Known lamps look no farther than the merging distance. A light that was seen in few frames is a flash, and a
+        faint flash's halo has its centre now here, now there.
+        """
+        best, index = (self._merge_cosine if candidate.hits >= _KNOWN else self._flash_cosine), None
         for k, ray in enumerate(rays):
             if (cosine := float(ray @ candidate.ray_compass)) >= best:
                 best, index = cosine, k

@@ -47,6 +47,8 @@ class ForwardBeaconCfg:
     """Limit of that."""
     merge_deg: float = 0.7
     """Detections closer than this are one light: a halo's parts, or the far lamp under the beacon."""
+    flash_deg: float = 3.0
+    """Likewise for lights that were seen in few frames so far."""
     glare_deg: float = 4.0
     """Detections this close to a light `glare_ratio` times as bright are parts of its halo."""
     glare_ratio: float = 5.0

@@ -60,6 +60,11 @@ class ForwardBeacon:
         return self._estimate
 
     @property
+    def passes(self) -> tuple[Pass, ...]:
+        """The beacon's last passes, at most eight; empty before the beacon is known."""
+        return tuple(self._own.chain) if self._own is not None else ()
+
+    @property
     def mask(self) -> BoolArray:
         """(n,) which of the last frame's detections are the beacon's."""
         return self._mask
