@@ -35,6 +35,8 @@ class DockFlags:
     """threshold, blob, cores, or your own as package.module:Name."""
     controller: str | None = None
     """A pilot of your own as package.module:Name, in place of the station's."""
+    controller: str | None = None
+    """A pilot of your own as package.module:Name, in place of the station's."""
     water: str | None = None
     """Water preset: I, IA, IB, II, III, 1C to 9C, clear, pool, lake."""
     attenuation: float | None = None
@@ -77,6 +79,8 @@ class DockFlags:
                 world.setdefault("sim", {}).setdefault("current", {})["direction_deg"] = degrees
         if self.detector is not None:
             changes["perception"] = {"detector": self.detector}
+        if self.controller is not None:
+            changes["control"] = {"controller": self.controller}
         if self.controller is not None:
             changes["control"] = {"controller": self.controller}
         return changes

@@ -1,8 +1,10 @@
 """How the light of a beam's pieces spreads about them, for the renderer and for the `beacons` fidelity alike.
 
-A piece sends unscattered light, which shows the beam as it is, and scattered light, which spreads by Wells' function.
-What of that falls within the piece's own size is a Gaussian of this size; farther out the halo is as about a point. A
-beam that is wider than its piece is long has no direction left to show: its unscattered light is a Gaussian as well.
+A piece sends unscattered light, which shows the beam as it is, and scattered light, which spreads by Wells' function
+smoothed over the piece's size s. With w the halo within s of a point, a share w² is a Gaussian of this size, for a halo
+that is narrower than the piece, and the rest is (1 + w) h(√(θ² + s²)), for one that is broader; together they hold what
+h holds. A beam that is wider than its piece is long has no direction left to show: its unscattered light is a Gaussian
+as well.
 """
 
 from __future__ import annotations
@@ -72,8 +74,9 @@ class BeamPieces:
         within = low * (1.0 - weight) + high * weight
         scattered = -np.expm1(-beam.scattering_depth)
         ribbon = (1.0 - scattered) / (1.0 + (beam.width_rad / length) ** 4)
-        blob = 1.0 - scattered - ribbon + scattered * within
+        blob = 1.0 - scattered - ribbon + scattered * within**2
         rows = self._log_rows[row] * (1.0 - weight[:, None]) + self._log_rows[row + 1] * weight[:, None]
+        rows += np.log1p(within)[:, None]
         return PieceLight(size, rows, scattered, ribbon, blob)
 
     def per_sr(self, pieces: PieceLight, angle2: Array, gauss: Array) -> Array:

@@ -40,22 +40,22 @@ class FlashModelCfg:
     """Behaviour of a detector towards a rotating beacon: a light whose halo and beam decide about size and shape.
 
     Found with probability 1 / (1 + (C_50 / C)^slope), C the code of its peak above the code at `background_px`. The
-    defaults were fitted to the threshold detector on 1,200 rendered frames: "pool", "clear" and "lake", night and
+    defaults were fitted to the threshold detector on 720 rendered frames: "pool", "clear" and "lake", night and
     "mild" daylight, 6 to 50 m, the beam up to 45° off.
     """
 
-    contrast_50_dn: float = 11.0
+    contrast_50_dn: float = 8.6
     """Contrast at which half of the flashes are found."""
-    slope: float = 9.0
+    slope: float = 13.0
     """Steepness in ln C."""
     background_px: float = 25.0
     """What is broader than this the detector takes for background."""
     floor_dn: float = 8.0
     """Contrast above which it sees light at all: the box is about what is brighter than half-way from there to the
     peak."""
-    box_scale: float = 0.9
+    box_scale: float = 1.0
     """Size of the box over the size of the part that is brighter than half of the peak."""
-    centre_shift: float = 0.75
+    centre_shift: float = 0.45
     """Shift of the centre along the beam over the shift of the box's middle."""
     centre_spread: float = 0.06
     """Standard deviation of the centre per axis over the box's mean half side, at a contrast of ten times the noise."""

@@ -21,7 +21,7 @@ from auvdock.optics.spots import FlashLines, Spots
 
 __all__ = ["FlashOptics", "measured_light", "with_flash"]
 
-_BLUR_PX = 1.5
+_BLUR_PX = 1.3
 """What lens and the detector's smoothing leave of a cusp: the brightness at this radius."""
 _LINE_PX = np.arange(-24.0, 72.5, 1.5)
 """Where the brightest point is looked for along the beam."""
@@ -156,8 +156,8 @@ def _top(
     """The part of a flash that is brighter than half of its peak, its contrast and the code of its background."""
     codes = np.minimum(scale.codes(lines.lines * electrons + around_e), 255.0)
     log_r = np.log(radii_px)
-    # The detector's background is the darkest part of a window about the spot.
-    background = min(float(np.interp(math.log(ways.background_px), log_r, line)) for line in codes)
+    rim = [float(np.interp(math.log(ways.background_px), log_r, line)) for line in codes]
+    background = 0.25 * (rim[0] + rim[1]) + 0.5 * rim[2]
     contrast = float(np.interp(math.log(_BLUR_PX), log_r, codes[2])) - background
     half = background + 0.5 * (contrast + ways.floor_dn)
     reach = [float(radii_px[np.argmax(line < half)]) if line[-1] < half else ways.background_px for line in codes]

@@ -55,7 +55,7 @@ class Beam(NamedTuple):
         edge_rad: (k + 1,) borders of the pieces, apparent angle from the lamp.
         rays_camera: (k, 3) unit directions to the pieces.
         range_m: (k,) distances of the pieces.
-        scattering_depth: (k,) b d.
+        scattering_depth: (k,) b times the path over which the light spreads.
         light_w_m2: (k,) irradiance from each.
         width_rad: (k,) standard deviation of the beam across, as seen from the camera.
     """
@@ -159,10 +159,12 @@ class RotatingLight:
         border[0] = _AT_LAMP * edge[1]
         beyond = (1.0 + border / max(lead, 1e-6)) ** -2
         share = np.diff(beyond) / (beyond[-1] - 1.0)
-        light += halo * share
+        bent = halo * share
         s, d = s.mean(axis=1), d.mean(axis=1)
         width = np.hypot(self._sigma, 0.5 * self._theta0 * self._b * s) * s / d
         middle = phi.mean(axis=1)
         rays = np.cos(middle)[:, None] * ray + np.sin(middle)[:, None] * along
-        beam = Beam(angle, ray, along, edge, rays, d, self._b * d, light, width)
+        # What was turned little spreads over the whole path, as a lamp's light does; what was turned much, from there.
+        depth = self._b * (bent * r + light * d) / np.maximum(bent + light, 1e-300)
+        beam = Beam(angle, ray, along, edge, rays, d, depth, light + bent, width)
         return beam, halo * (1.0 - float(share.sum()))

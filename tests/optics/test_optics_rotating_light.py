@@ -157,6 +157,15 @@ def test_facing_beam_is_round_and_one_beside_is_long():
     assert aspect(beside) < 0.8
 
 
+@pytest.mark.parametrize("range_m", [10.0, 25.0, 45.0])
+def test_no_direction_outshines_the_facing_one(range_m):
+    """The image's peak falls from the facing beam on, whatever part of the light is drawn as lamp or as beam."""
+    unit = eye()
+    views = [unit.lit.look(place(range_m), off(degrees)) for degrees in (0.0, 2.0, 4.0, 8.0, 16.0)]
+    peaks = [float(unit.electrons(view, 1.0).max()) for view in views]
+    assert np.all(np.diff(peaks) < 0.0)
+
+
 def test_long_exposure_averages_the_turn():
     """The mean over the exposure of the light at many instants, to 1 % at the default rate and 16 ms."""
     unit = eye()
