@@ -96,9 +96,9 @@ class EpisodeResult:
     start_range_m: float | None = None
     """Rotating beacon: distance of the start."""
     acquire_s: float | None = None
-    """Rotating beacon: when the first azimuth or the first measured pose came."""
+    """Rotating beacon: when the first azimuth or the first true pose came."""
     first_pose_s: float | None = None
-    """Rotating beacon: when the first measured pose came."""
+    """Rotating beacon: when the first measured pose came that is not far off the truth."""
     azimuth_fixes: int | None = None
     """Rotating beacon: azimuths measured."""
     azimuth_rms_rad: float | None = None

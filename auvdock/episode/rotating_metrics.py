@@ -7,6 +7,8 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from auvdock.controllers.rotating.modes import ROTATING_MODES
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
@@ -16,6 +18,8 @@ from auvdock.episode.trace import Tick
 
 __all__ = ["RotatingMetrics"]
 
+_TRUE_SHARE, _TRUE_M = 0.1, 0.5
+"""A first pose counts as one of the station if its error is at most this share of the range and so much more (ours)."""
 _REMEMBERED = 150
 """Control periods whose true azimuth is kept: a fix tells of a moment that is past."""
 
@@ -55,7 +59,10 @@ class RotatingMetrics:
         percept = tick.percept
         if percept is not None:
             if self._pose_s is None and percept.pose is not None and percept.pose.measured:
-                self._pose_s = now
+                gap = float(np.linalg.norm(percept.pose.T_station_camera[:3, 3] - place[:3]))
+                # Parts of the beacon's own halo can look like an array for a frame: that is no sight of the station.
+                if gap <= _TRUE_SHARE * float(np.linalg.norm(place[:3])) + _TRUE_M:
+                    self._pose_s = now
             fix = percept.azimuth
             if fix is not None:
                 self._fix_s = now if self._fix_s is None else self._fix_s
