@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from auvdock.core.arrays import Image
+from auvdock.core.landing_station import LandingStationCfg
 from auvdock.optics.gl import offscreen_context
 from auvdock.sim.mj import mujoco
 from auvdock.sim.simulator import Simulator
@@ -45,6 +46,12 @@ class ChaseCamera:
         camera.azimuth = math.degrees(math.atan2(forward[1], forward[0])) + 25.0
         camera.elevation = -18.0
         camera.distance = 4.5
+        if isinstance(simulator.station, LandingStationCfg):
+            # From the side, so far back that vehicle and platform are both in view.
+            down = T_world_body[:3, 3] - simulator.T_world_station[:3, 3]
+            camera.lookat[:] = simulator.T_world_station[:3, 3] + 0.5 * down
+            camera.azimuth, camera.elevation = 60.0, -14.0
+            camera.distance = 2.2 + 1.4 * float(np.linalg.norm(down))
         # The simulator leaves derived poses stale while nobody looks; draw from the state itself.
         mujoco.mj_kinematics(simulator.model, simulator.data)
         category = mujoco.mjtCatBit.mjCAT_ALL

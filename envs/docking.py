@@ -73,16 +73,14 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, ClassVar
 
-import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from auvdock.core.arrays import Array, Image
-from auvdock.core.contracts import AzimuthFix, Percept, Proprioception
-from auvdock.core.errors import ConfigError
+from auvdock.core.arrays import Array
+from auvdock.core.contracts import AzimuthFix, Percept
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
-from auvdock.envs.chase import ChaseCamera
 from auvdock.envs.config import WorldCfg
+from auvdock.envs.vehicle_env import BOUND, OBSERVATIONS, VehicleEnv, box, check_options
 from auvdock.envs.world import DockingWorld, Sensed
 from auvdock.perception.detectors import make_station_detector
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
@@ -90,14 +88,8 @@ from auvdock.sim.truth import Truth
 
 __all__ = ["OBSERVATIONS", "DockingEnv"]
 
-OBSERVATIONS = ("state", "pose", "image")
-BOUND = 1000.0
-"""Bound of every observed number, in its own unit."""
 
-Observation = Array | dict[str, Any]
-
-
-class DockingEnv(gymnasium.Env[Any, Any]):
+class DockingEnv(VehicleEnv):
     """`auvdock/ConicalDocking-v0`; see the module's docstring for the tables."""
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 30}
@@ -117,204 +109,63 @@ class DockingEnv(gymnasium.Env[Any, Any]):
         Raises:
             ConfigError: an option that does not exist or does not fit the others.
         """
-        if observation not in OBSERVATIONS:
-            raise ConfigError("observation", observation, f"one of {', '.join(OBSERVATIONS)}")
-        if render_mode not in (None, "rgb_array"):
-            raise ConfigError("render_mode", render_mode, "'rgb_array' or None")
-        if render_camera not in ("chase", "bow"):
-            raise ConfigError("render_camera", render_camera, "'chase' or 'bow'")
-        if observation == "image" and fidelity != "pixels":
-            raise ConfigError("fidelity", fidelity, "'pixels', image observations need rendered frames")
+        check_options(observation, fidelity, render_mode, render_camera, ("chase", "bow"))
         self.cfg = dataclasses.replace(cfg or WorldCfg(), fidelity=fidelity)
-        self.observation = observation
-        self.render_mode = render_mode
-        self._render_camera = render_camera
-        self._perception_cfg = perception or PerceptionCfg()
-        self._world = DockingWorld(self.cfg, self._perception_cfg.detector)
-        self._detector = make_station_detector(self._perception_cfg.detector, self.cfg.station)
+        perception = perception or PerceptionCfg()
+        self._world = DockingWorld(self.cfg, perception.detector)
+        self._detector = make_station_detector(perception.detector, self.cfg.station)
         self._perception = BeaconPerception(
-            self._perception_cfg,
+            perception,
             self._world.camera,
             self.cfg.station.layout,
             self.cfg.station.rotating,
             heading_surveyed=self.cfg.station_heading == "surveyed",
         )
-        self._chase = ChaseCamera(self._world.simulator)
         self._percept: Percept | None = None
         self._fix: AzimuthFix | None = None
-        self._sensed: Sensed | None = None
-        self._image: Image | None = None
-        self._distance_m = 0.0
-        self._energy_j = 0.0
-        actuators = len(self._world.simulator.vehicle.actuators)
-        self.action_space = spaces.Box(-1.0, 1.0, (actuators,), np.float32)
-        self.observation_space = self._make_observation_space()
+        super().__init__(self._world, observation, render_mode, render_camera)
 
     @property
     def world(self) -> DockingWorld:
         """The world inside, for metrics."""
         return self._world
 
-    @property
-    def proprioception(self) -> Proprioception:
-        """The vehicle's own sensors at the last step; what the action wrappers steer by.
-
-        Raises:
-            ConfigError: the environment has not been reset.
-        """
-        if self._sensed is None:
-            raise ConfigError("env", "not reset", "env.reset() before the first step")
-        return self._sensed.proprioception
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode; the episode's own seed is drawn from the environment's generator."""
-        super().reset(seed=seed)
-        self._world.reset(int(self.np_random.integers(2**31)))
+    def _forget(self) -> None:
         self._perception.reset()
         self._percept = None
         self._fix = None
-        self._image = None
-        self._sense()
-        truth = self._world.truth
-        self._distance_m = self._distance_to_latch(truth)
-        self._energy_j = 0.0
-        return self._observe(truth), self._info(truth)
 
-    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:  # noqa: ANN401
-        """Apply actuator commands for one control period."""
-        values = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
-        self._world.step(values)
-        self._sense()
-        truth = self._world.truth
-        end = self._world.end
-        success = self._world.is_success
-        truncated = not success and end == "timeout"
-        terminated = success or (end is not None and not truncated)
-        return self._observe(truth), self._reward(truth, success, end), terminated, truncated, self._info(truth)
+    def _perceive(self, sensed: Sensed) -> None:
+        detections = self._detector.detect(sensed.frame) if sensed.frame is not None else sensed.detections
+        if detections is not None:
+            self._percept = self._perception.update(detections, sensed.proprioception)
+            self._fix = self._percept.azimuth or self._fix
 
-    def render(self) -> Any:  # noqa: ANN401
-        """An image (H, W, 3) uint8 from behind and above the vehicle, or what its bow camera sees."""
-        if self.render_mode is None:
-            return None
-        if self._render_camera == "chase":
-            return self._chase.render()
-        truth = self._world.truth
-        if self._image is not None:
-            return self._image
-        return self._world.imager.capture(truth.T_world_body, truth.time_s).image
+    def _place(self, truth: Truth) -> Array:
+        return truth.nose_station_m
 
-    def close(self) -> None:
-        """Release the renderers."""
-        self._world.close()
-        self._chase.close()
-
-    def _sense(self) -> None:
-        if self.observation == "state":
-            # Nobody looks through the camera, so no frame is made.
-            self._sensed = Sensed(self._world.simulator.proprioception(), None, None)
-            return
-        self._sensed = sensed = self._world.sense()
-        if sensed.frame is not None:
-            self._image = sensed.frame.image
-        if self.observation == "pose":
-            detections = self._detector.detect(sensed.frame) if sensed.frame is not None else sensed.detections
-            if detections is not None:
-                self._percept = self._perception.update(detections, sensed.proprioception)
-                self._fix = self._percept.azimuth or self._fix
-
-    def _reward(self, truth: Truth, success: bool, end: str | None) -> float:
-        distance_m = self._distance_to_latch(truth)
-        reward = self._distance_m - distance_m - 0.001 * (truth.energy_j - self._energy_j)
-        self._distance_m, self._energy_j = distance_m, truth.energy_j
-        if success:
-            reward += 100.0
-        elif end in ("diverged", "collision"):
-            reward -= 50.0
-        return float(reward)
-
-    def _distance_to_latch(self, truth: Truth) -> float:
+    def _distance_to_go_m(self, truth: Truth) -> float:
         funnel, latch = self.cfg.station.funnel, self.cfg.station.latch
         goal = np.array([-(funnel.length_m + latch.depth_m), 0.0, 0.0])
         return float(np.linalg.norm(truth.nose_station_m - goal))
 
-    def _info(self, truth: Truth) -> dict[str, Any]:
-        success = self._world.is_success
-        return {
-            "is_success": success,
-            "failure_reason": None if success else self._world.end,
-            "time_s": truth.time_s,
-            "peak_contact_force_n": truth.peak_contact_force_n,
-            "energy_j": truth.energy_j,
+    def _pose_spaces(self) -> dict[str, spaces.Space[Any]]:
+        parts: dict[str, spaces.Space[Any]] = {
+            "pose": box(6),
+            "pose_valid": spaces.Box(0.0, 1.0, (1,), np.float64),
+            "long_range": box(4),
+            "entrance": box(4),
+            "proprioception": box(13),
         }
+        if self.cfg.station.rotating is not None:
+            parts["azimuth"] = box(7)
+        return parts
 
-    def _make_observation_space(self) -> spaces.Space[Any]:
-        def box(*shape: int) -> spaces.Box:
-            return spaces.Box(-BOUND, BOUND, shape, np.float64)
-
-        if self.observation == "state":
-            return box(19)
-        if self.observation == "pose":
-            parts: dict[str, spaces.Space[Any]] = {
-                "pose": box(6),
-                "pose_valid": spaces.Box(0.0, 1.0, (1,), np.float64),
-                "long_range": box(4),
-                "entrance": box(4),
-                "proprioception": box(13),
-            }
-            if self.cfg.station.rotating is not None:
-                parts["azimuth"] = box(7)
-            return spaces.Dict(parts)
-        camera = self.cfg.camera
-        return spaces.Dict(
-            {
-                "image": spaces.Box(0, 255, (camera.height_px, camera.width_px, 3), np.uint8),
-                "proprioception": box(13),
-            }
-        )
-
-    def _observe(self, truth: Truth) -> Observation:
-        if self.observation == "state":
-            return self._state(truth)
-        own = _proprioception_vector(self.proprioception)
-        if self.observation == "image":
-            image = self._image if self._image is not None else self._blank()
-            return {"image": image.copy(), "proprioception": own}
-        seen = {**_percept_vectors(self._percept, self._world.camera.T_body_camera), "proprioception": own}
+    def _pose_vectors(self) -> dict[str, Array]:
+        seen = _percept_vectors(self._percept, self._world.camera.T_body_camera)
         if self.cfg.station.rotating is not None:
             seen["azimuth"] = _azimuth_vector(self._fix, self.proprioception.time_s)
         return seen
-
-    def _state(self, truth: Truth) -> Array:
-        R_station_world = self._world.simulator.T_world_station[:3, :3].T
-        rotation = R_station_world @ truth.T_world_body[:3, :3]
-        state = np.concatenate(
-            [
-                truth.nose_station_m,
-                rotation[:, 0],
-                rotation[:, 1],
-                truth.nu_body,
-                R_station_world @ truth.current_world_m_s,
-                [float(truth.touching_station)],
-            ]
-        )
-        return np.clip(np.nan_to_num(state, nan=BOUND), -BOUND, BOUND)  # a diverged state must stay in its space
-
-    def _blank(self) -> Image:
-        return np.zeros((self.cfg.camera.height_px, self.cfg.camera.width_px, 3), dtype=np.uint8)
-
-
-def _proprioception_vector(own: Proprioception) -> Array:
-    return np.concatenate(
-        [
-            [own.depth_m],
-            own.euler_zyx_rad,
-            own.angular_velocity_rad_s,
-            own.velocity_ground_m_s,
-            own.velocity_water_m_s,
-        ]
-    )
 
 
 def _percept_vectors(percept: Percept | None, T_body_camera: Array) -> dict[str, Array]:

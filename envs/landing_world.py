@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, Image
 from auvdock.core.calibrated_camera import CalibratedCameraCfg, make_calibrated_camera
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Proprioception
@@ -45,7 +45,7 @@ def draw_landing_start(
 class LandingWorld(VehicleWorld):
     """A vehicle, a platform on the floor, the water between them and a belly camera with lamps."""
 
-    def __init__(self, cfg: LandingWorldCfg, detector: str = "threshold", tag_detector: str = "apriltag") -> None:
+    def __init__(self, cfg: LandingWorldCfg, detector: str = "cores", tag_detector: str = "apriltag") -> None:
         """Build the world; no OpenGL context is made before a frame is asked for.
 
         Args:
@@ -96,6 +96,11 @@ class LandingWorld(VehicleWorld):
             detections, tags = self._sensor.detect(truth.T_world_body, truth.time_s)
             return Sensed(proprioception, None, detections, tags)
         return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s), None)
+
+    def picture(self) -> Image:
+        """(H, W, 3) uint8 RGB of what the camera sees now."""
+        truth = self.truth
+        return self.imager.capture(truth.T_world_body, truth.time_s).image
 
     def close(self) -> None:
         """Release the renderer."""

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from auvdock.assets import asset_names
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, Image
 from auvdock.core.camera import Camera, CameraCfg, make_camera
 from auvdock.core.contracts import Detections, Frame, Proprioception, TagDetection
 from auvdock.core.errors import ConfigError
@@ -143,6 +143,10 @@ class VehicleWorld(ABC):
     @abstractmethod
     def _look(self, truth: Truth, proprioception: Proprioception) -> Sensed:
         """Take a frame, or what stands in for it."""
+
+    @abstractmethod
+    def picture(self) -> Image:
+        """(H, W, 3) uint8 RGB of what the pilot's camera sees now, in whatever fidelity."""
 
     @abstractmethod
     def close(self) -> None:

@@ -1,0 +1,176 @@
+"""Gymnasium environment for landing.
+
+## Description
+An autonomous underwater vehicle with a belly camera must find a lit platform below it, line up with its centre line,
+come down into V-shaped guides and stay slow until an arm closes over it. Five lights lead from afar, an AprilTag near
+by. Success is defined in `auvdock.core.landing_station.LandingLatchCfg`.
+
+## Action space
+`Box(-1, 1, (n,), float32)`, one command per actuator of the vehicle that `LandingWorldCfg.sim.vehicle` names. For
+`bluerov2_heavy`, the default, n = 8:
+
+| Num | Action | Min | Max | Actuator | Unit at ±1 |
+|---|---|---|---|---|---|
+| 0 | thrust forward and to port | -1 | 1 | fore_starboard | thrust, N |
+| 1 | thrust forward and to starboard | -1 | 1 | fore_port | thrust, N |
+| 2 | thrust aft and to port | -1 | 1 | aft_starboard | thrust, N |
+| 3 | thrust aft and to starboard | -1 | 1 | aft_port | thrust, N |
+| 4 | upward thrust, fore starboard | -1 | 1 | fore_starboard_vertical | thrust, N |
+| 5 | upward thrust, fore port | -1 | 1 | fore_port_vertical | thrust, N |
+| 6 | upward thrust, aft starboard | -1 | 1 | aft_starboard_vertical | thrust, N |
+| 7 | upward thrust, aft port | -1 | 1 | aft_port_vertical | thrust, N |
+
+For `remus_hybrid` they are those of `auvdock/ConicalDocking-v0`, n = 7. Limits, places and directions stand in
+`assets/vehicles/`.
+
+## Observation space
+Chosen by `observation`. "Seat" is the middle of the round that comes to rest in the guides, of the hull or of a keel.
+
+All boxes are float64 and bounded by ±1000, which nothing reaches before the episode ends as `diverged`.
+
+`"state"` (default): `Box` of shape (19,), the true state. Privileged: no real vehicle has it.
+
+| Num | Observation | Unit |
+|---|---|---|
+| 0-2 | seat less its place in the guides, station frame: along (ξ), across to port (η), up (ζ) | m |
+| 3-8 | first two columns of the rotation body to station | - |
+| 9-14 | velocity over ground ν: surge, sway (to port), heave (up), roll, pitch, yaw rates | m/s, rad/s |
+| 15-17 | current in the station frame | m/s |
+| 18 | 1 while touching the station | - |
+
+`"pose"`: `Dict` of what perception and the vehicle's own sensors give; no truth in it.
+
+| Key | Shape | Content |
+|---|---|---|
+| `pose` | (6,) | ξ, η, ζ of the seat; roll, pitch, yaw of the body in the station frame, as perception sees them |
+| `pose_valid` | (1,) | 1 if measured in the newest frame, 0.5 if held, 0 if there is none (pose is then 0) |
+| `level` | (1,) | what the newest frame's pose rests on: 0 nothing, 1 lights, 2 tag, 3 both |
+| `long_range` | (4,) | unit ray to the group of lights in the camera frame and its score; 0 if none or with a pose |
+| `proprioception` | (13,) | depth; roll, pitch, yaw; p, q, r; velocity over ground; velocity through water |
+
+`"image"`: `Dict` of `image` (height, width, 3) uint8 from the belly camera (up is forward, right is starboard) and
+`proprioception` as above. Needs `fidelity="pixels"`.
+
+## Reward
+Progress of the seat towards its place in metres, less 0.001 times the thruster work in joules, plus 100 on success,
+less 50 on collision or divergence.
+
+## Starting state
+Uniform within `LandingWorldCfg.start`: 3 to 6 m above the seat's place, ±1.5 m along and across, ±45° of heading, at
+rest in the water.
+
+## Episode end
+Terminated by success, a collision harder than `LandingWorldCfg.limits.collision_force_n`, divergence, or an arm that
+closed after a touchdown that was too hard (`terminal`). Truncated after `LandingWorldCfg.limits.max_time_s`. `info`
+always has `is_success` (bool) and `failure_reason` (str or None).
+
+## Arguments
+`cfg` (`LandingWorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`
+(`LandingPerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"), `render_camera` ("chase" or "belly").
+
+## Version history
+- v0: first version.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+
+from auvdock.core.arrays import Array
+from auvdock.core.transforms import euler_zyx_from_rotation, invert
+from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.envs.landing_world import LandingWorld
+from auvdock.envs.vehicle_env import VehicleEnv, box, check_options
+from auvdock.envs.vehicle_world import Sensed
+from auvdock.perception.detectors import make_detector
+from auvdock.perception.landing.config import LandingPerceptionCfg
+from auvdock.perception.landing.pipeline import LandingPercept, LandingPerception
+from auvdock.perception.landing.tag_detectors import make_tag_detector
+from auvdock.sim.truth import Truth
+
+__all__ = ["LandingEnv"]
+
+_LEVELS = {"none": 0.0, "lights": 1.0, "tag": 2.0, "fused": 3.0}
+
+
+class LandingEnv(VehicleEnv):
+    """`auvdock/LandingDocking-v0`; see the module's docstring for the tables."""
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 20}
+
+    def __init__(
+        self,
+        cfg: LandingWorldCfg | None = None,
+        *,
+        observation: str = "state",
+        fidelity: str = "beacons",
+        perception: LandingPerceptionCfg | None = None,
+        render_mode: str | None = None,
+        render_camera: str = "chase",
+    ) -> None:
+        """Build the environment; no renderer is made before an image is asked for.
+
+        Raises:
+            ConfigError: an option that does not exist or does not fit the others.
+        """
+        check_options(observation, fidelity, render_mode, render_camera, ("chase", "belly"))
+        self.cfg = dataclasses.replace(cfg or LandingWorldCfg(), fidelity=fidelity)
+        perception = perception or LandingPerceptionCfg()
+        self._world = LandingWorld(self.cfg, perception.detector, perception.tag_detector)
+        self._detector = make_detector(perception.detector)
+        self._tag_detector = make_tag_detector(perception.tag_detector)
+        self._perception = LandingPerception(perception, self._world.camera, self.cfg.station)
+        self._percept: LandingPercept | None = None
+        self._seat = np.append(self._world.simulator.vehicle.seat_body_m, 1.0)
+        super().__init__(self._world, observation, render_mode, render_camera)
+
+    @property
+    def world(self) -> LandingWorld:
+        """The world inside, for metrics."""
+        return self._world
+
+    def _forget(self) -> None:
+        self._perception.reset()
+        self._percept = None
+
+    def _perceive(self, sensed: Sensed) -> None:
+        own = sensed.proprioception
+        if sensed.frame is not None:
+            tags = self._tag_detector.detect(sensed.frame, self._perception.tag_regions(own))
+            self._percept = self._perception.update(self._detector.detect(sensed.frame), tags, own)
+        elif sensed.detections is not None:
+            self._percept = self._perception.update(sensed.detections, sensed.tags, own)
+
+    def _place(self, truth: Truth) -> Array:
+        return truth.landing.seat_error_m if truth.landing is not None else np.zeros(3)
+
+    def _distance_to_go_m(self, truth: Truth) -> float:
+        return truth.range_m
+
+    def _pose_spaces(self) -> dict[str, spaces.Space[Any]]:
+        return {
+            "pose": box(6),
+            "pose_valid": spaces.Box(0.0, 1.0, (1,), np.float64),
+            "level": spaces.Box(0.0, 3.0, (1,), np.float64),
+            "long_range": box(4),
+            "proprioception": box(13),
+        }
+
+    def _pose_vectors(self) -> dict[str, Array]:
+        pose, valid, level, ray = np.zeros(6), np.zeros(1), np.zeros(1), np.zeros(4)
+        percept = self._percept
+        if percept is not None:
+            level[0] = _LEVELS[percept.level]
+            if percept.pose is not None:
+                T_station_body = percept.pose.T_station_camera @ invert(self._world.camera.T_body_camera)
+                pose[:3] = (T_station_body @ self._seat)[:3]
+                pose[2] -= self.cfg.station.guide.seat_height_m
+                pose[3:] = euler_zyx_from_rotation(T_station_body[:3, :3])
+                valid[0] = 1.0 if percept.pose.measured else 0.5
+            if percept.long_range is not None:
+                ray = np.append(percept.long_range.ray_camera, percept.long_range.score)
+        return {"pose": pose, "pose_valid": valid, "level": level, "long_range": ray}

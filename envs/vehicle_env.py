@@ -1,0 +1,236 @@
+"""What every docking environment shares: action, senses, reward, endings, pictures."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from auvdock.core.arrays import Array, Image
+from auvdock.core.contracts import Proprioception
+from auvdock.core.errors import ConfigError
+from auvdock.envs.chase import ChaseCamera
+from auvdock.envs.vehicle_world import Sensed, VehicleWorld
+from auvdock.sim.truth import Truth
+
+__all__ = ["BOUND", "OBSERVATIONS", "Observation", "VehicleEnv", "box", "check_options", "proprioception_vector"]
+
+OBSERVATIONS = ("state", "pose", "image")
+BOUND = 1000.0
+"""Bound of every observed number, in its own unit."""
+
+Observation = Array | dict[str, Any]
+
+
+class VehicleEnv(gymnasium.Env[Any, Any], ABC):
+    """A `VehicleWorld` as a Gymnasium environment; a kind of docking says what is observed and how far it is to go."""
+
+    def __init__(self, world: VehicleWorld, observation: str, render_mode: str | None, render_camera: str) -> None:
+        """Wrap a world; the options have been checked.
+
+        Args:
+            world: the world.
+            observation: one of `OBSERVATIONS`.
+            render_mode: "rgb_array" or None.
+            render_camera: "chase", or anything else for the pilot's camera.
+        """
+        self.observation = observation
+        self.render_mode = render_mode
+        self._render_camera = render_camera
+        self._vehicle_world = world
+        self._chase = ChaseCamera(world.simulator)
+        self._sensed: Sensed | None = None
+        self._image: Image | None = None
+        self._distance_m = 0.0
+        self._energy_j = 0.0
+        actuators = len(world.simulator.vehicle.actuators)
+        self.action_space = spaces.Box(-1.0, 1.0, (actuators,), np.float32)
+        self.observation_space = self._make_observation_space()
+
+    @abstractmethod
+    def _forget(self) -> None:
+        """Reset perception."""
+
+    @abstractmethod
+    def _perceive(self, sensed: Sensed) -> None:
+        """Let perception look at what was sensed."""
+
+    @abstractmethod
+    def _pose_spaces(self) -> dict[str, spaces.Space[Any]]:
+        """Spaces of what perception sees."""
+
+    @abstractmethod
+    def _pose_vectors(self) -> dict[str, Array]:
+        """What perception sees."""
+
+    @abstractmethod
+    def _place(self, truth: Truth) -> Array:
+        """(3,) where the vehicle is in the station frame, for the state observation."""
+
+    @abstractmethod
+    def _distance_to_go_m(self, truth: Truth) -> float:
+        """Distance from where the latch closes."""
+
+    @property
+    def proprioception(self) -> Proprioception:
+        """The vehicle's own sensors at the last step; what the action wrappers steer by.
+
+        Raises:
+            ConfigError: the environment has not been reset.
+        """
+        if self._sensed is None:
+            raise ConfigError("env", "not reset", "env.reset() before the first step")
+        return self._sensed.proprioception
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode; the episode's own seed is drawn from the environment's generator."""
+        super().reset(seed=seed)
+        self._vehicle_world.reset(int(self.np_random.integers(2**31)))
+        self._forget()
+        self._image = None
+        self._sense()
+        truth = self._vehicle_world.truth
+        self._distance_m = self._distance_to_go_m(truth)
+        self._energy_j = 0.0
+        return self._observe(truth), self._info(truth)
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:  # noqa: ANN401
+        """Apply actuator commands for one control period."""
+        world = self._vehicle_world
+        values = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        world.step(values)
+        self._sense()
+        truth = world.truth
+        end = world.end
+        success = world.is_success
+        truncated = not success and end == "timeout"
+        terminated = success or (end is not None and not truncated)
+        return self._observe(truth), self._reward(truth, success, end), terminated, truncated, self._info(truth)
+
+    def render(self) -> Any:  # noqa: ANN401
+        """An image (H, W, 3) uint8 from behind and above the vehicle, or what the pilot's camera sees."""
+        if self.render_mode is None:
+            return None
+        if self._render_camera == "chase":
+            return self._chase.render()
+        if self._image is not None:
+            return self._image
+        return self._vehicle_world.picture()
+
+    def close(self) -> None:
+        """Release the renderers."""
+        self._vehicle_world.close()
+        self._chase.close()
+
+    def _sense(self) -> None:
+        if self.observation == "state":
+            # Nobody looks through the camera, so no frame is made.
+            self._sensed = Sensed(self._vehicle_world.simulator.proprioception(), None, None)
+            return
+        self._sensed = sensed = self._vehicle_world.sense()
+        if sensed.frame is not None:
+            self._image = sensed.frame.image
+        if self.observation == "pose":
+            self._perceive(sensed)
+
+    def _reward(self, truth: Truth, success: bool, end: str | None) -> float:
+        distance_m = self._distance_to_go_m(truth)
+        reward = self._distance_m - distance_m - 0.001 * (truth.energy_j - self._energy_j)
+        self._distance_m, self._energy_j = distance_m, truth.energy_j
+        if success:
+            reward += 100.0
+        elif end in ("diverged", "collision"):
+            reward -= 50.0
+        return float(reward)
+
+    def _info(self, truth: Truth) -> dict[str, Any]:
+        success = self._vehicle_world.is_success
+        return {
+            "is_success": success,
+            "failure_reason": None if success else self._vehicle_world.end,
+            "time_s": truth.time_s,
+            "peak_contact_force_n": truth.peak_contact_force_n,
+            "energy_j": truth.energy_j,
+        }
+
+    def _make_observation_space(self) -> spaces.Space[Any]:
+        if self.observation == "state":
+            return box(19)
+        if self.observation == "pose":
+            return spaces.Dict(self._pose_spaces())
+        camera = self._vehicle_world.camera
+        return spaces.Dict(
+            {
+                "image": spaces.Box(0, 255, (camera.height_px, camera.width_px, 3), np.uint8),
+                "proprioception": box(13),
+            }
+        )
+
+    def _observe(self, truth: Truth) -> Observation:
+        if self.observation == "state":
+            return self._state(truth)
+        own = proprioception_vector(self.proprioception)
+        if self.observation == "image":
+            image = self._image if self._image is not None else self._blank()
+            return {"image": image.copy(), "proprioception": own}
+        return {**self._pose_vectors(), "proprioception": own}
+
+    def _state(self, truth: Truth) -> Array:
+        R_station_world = self._vehicle_world.simulator.T_world_station[:3, :3].T
+        rotation = R_station_world @ truth.T_world_body[:3, :3]
+        state = np.concatenate(
+            [
+                self._place(truth),
+                rotation[:, 0],
+                rotation[:, 1],
+                truth.nu_body,
+                R_station_world @ truth.current_world_m_s,
+                [float(truth.touching_station)],
+            ]
+        )
+        return np.clip(np.nan_to_num(state, nan=BOUND), -BOUND, BOUND)  # a diverged state must stay in its space
+
+    def _blank(self) -> Image:
+        camera = self._vehicle_world.camera
+        return np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
+
+
+def check_options(
+    observation: str, fidelity: str, render_mode: str | None, camera: str, cameras: tuple[str, str]
+) -> None:
+    """Refuse options that do not exist or do not fit each other.
+
+    Raises:
+        ConfigError: the first such option.
+    """
+    if observation not in OBSERVATIONS:
+        raise ConfigError("observation", observation, f"one of {', '.join(OBSERVATIONS)}")
+    if render_mode not in (None, "rgb_array"):
+        raise ConfigError("render_mode", render_mode, "'rgb_array' or None")
+    if camera not in cameras:
+        raise ConfigError("render_camera", camera, " or ".join(repr(name) for name in cameras))
+    if observation == "image" and fidelity != "pixels":
+        raise ConfigError("fidelity", fidelity, "'pixels', image observations need rendered frames")
+
+
+def box(*shape: int) -> spaces.Box:
+    """A box of the bound that all observations have."""
+    return spaces.Box(-BOUND, BOUND, shape, np.float64)
+
+
+def proprioception_vector(own: Proprioception) -> Array:
+    """(13,) depth; roll, pitch, yaw; p, q, r; velocity over ground; velocity through the water."""
+    return np.concatenate(
+        [
+            [own.depth_m],
+            own.euler_zyx_rad,
+            own.angular_velocity_rad_s,
+            own.velocity_ground_m_s,
+            own.velocity_water_m_s,
+        ]
+    )
