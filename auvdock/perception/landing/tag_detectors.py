@@ -66,6 +66,10 @@ class AprilTagDetector:
         settings.minMarkerDistanceRate = 0.01
         self._detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(_FAMILY), settings)
 
+    def __reduce__(self) -> tuple[type[AprilTagDetector], tuple[()]]:
+        """OpenCV's parts cannot be pickled: they are made anew."""
+        return AprilTagDetector, ()
+
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
         """Detect in the whole frame, or only in the given regions when there are any."""
         found: list[TagDetection] = []
@@ -100,6 +104,10 @@ class ContourTagDetector:
     def __init__(self) -> None:
         """Load the family."""
         self._family = cv2.aruco.getPredefinedDictionary(_FAMILY)
+
+    def __reduce__(self) -> tuple[type[ContourTagDetector], tuple[()]]:
+        """OpenCV's parts cannot be pickled: they are made anew."""
+        return ContourTagDetector, ()
 
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
         """Detect in the whole frame, or only in the given regions when there are any."""
