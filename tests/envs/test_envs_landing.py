@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from auvdock.core.arrays import Array
 from auvdock.core.calibrated_camera import CalibratedCameraCfg
 from auvdock.core.errors import ConfigError
+from auvdock.core.transforms import invert
 from auvdock.envs.config import LimitsCfg
 from auvdock.envs.landing import LandingEnv
 from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
@@ -142,7 +144,7 @@ def test_image_up_is_forward_and_right_is_starboard() -> None:
     world = LandingWorld(LandingWorldCfg(start=start))
     world.reset(0)
     camera = world.camera
-    T_camera_world = np.linalg.inv(world.truth.T_world_body @ camera.T_body_camera)
+    T_camera_world: Array = invert(world.truth.T_world_body @ camera.T_body_camera)
     for point, column, row in (((0.75, 0.0, 0.0), 0.0, -1.0), ((0.45, -0.35, 0.0), 1.0, -1.0)):
         world_point = np.array([*point, 1.0]) - np.array([0.0, 0.0, world.cfg.station.depth_m, 0.0])
         pixel = camera.project((T_camera_world @ world_point)[None, :3])[0]
