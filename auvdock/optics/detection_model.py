@@ -59,7 +59,7 @@ class FlashModelCfg:
     """Shift of the centre along the beam over the shift of the box's middle."""
     centre_spread: float = 0.06
     """Standard deviation of the centre per axis over the box's mean half side, at a contrast of ten times the noise."""
-    flux_spread: float = 0.005
+    flux_spread: float = 0.015
     """Standard deviation of ln(flux), beyond shot noise."""
 
     def __post_init__(self) -> None:
