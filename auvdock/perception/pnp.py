@@ -97,7 +97,7 @@ class PnpSolution:
         """
         left = _left_jacobian(self.rotation_vector)
         x, y, z = self.translation_m.tolist()
-        skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        skew = np.array((0.0, -z, y, z, 0.0, -x, -y, x, 0.0)).reshape(3, 3)
         to = np.zeros((6, 6))
         back = -self.rotation.T
         to[:3, :3] = back @ skew @ left
@@ -214,10 +214,11 @@ class PnpSolver:
         else:
             pose, decrement = np.concatenate(start), _DECREMENT
         weight = (1.0 / sigma).repeat(2)
+        column = weight[:, None]
         target = pixels.reshape(-1)
         prior_vector, prior_matrix = self._prior_terms(prior) if self._prior_weight else (np.zeros(3), np.zeros((3, 3)))
         damping, cost, trial, factor = 0.0, math.inf, pose, _IDENTITY
-        normal, gradient, residual, offset = _IDENTITY, np.zeros(6), target, np.zeros(3)
+        normal, gradient, residual, pull = _IDENTITY, np.zeros(6), target, np.zeros(3)
         for _ in range(_MAX_ITERATIONS):
             image, jacobian = cv2.projectPoints(points, trial[:3], trial[3:], self._matrix, self._distortion)
             difference = image.reshape(-1) - target
@@ -225,16 +226,17 @@ class PnpSolver:
             trial_cost = float(weighted @ weighted)
             if self._prior_weight:
                 offset = trial[:3] - prior_vector
-                trial_cost += float(offset @ prior_matrix @ offset)
+                pull = prior_matrix @ offset
+                trial_cost += float(offset @ pull)
             if not math.isfinite(trial_cost):
                 return None
             if trial_cost <= cost:
                 pose, cost, residual, damping = trial, trial_cost, difference, damping * 0.1
-                scaled = weight[:, None] * jacobian[:, :6]
+                scaled = column * jacobian[:, :6]
                 normal, gradient = scaled.T @ scaled, scaled.T @ weighted
                 if self._prior_weight:
                     normal[:3, :3] += prior_matrix
-                    gradient[:3] += prior_matrix @ offset
+                    gradient[:3] += pull
             else:
                 damping = max(10.0 * damping, 1e-3)
             damped = normal + np.diag(damping * normal.diagonal()) if damping > 1e-9 else normal
@@ -282,12 +284,8 @@ class PnpSolver:
         across = self._prior_weight * 2.0 * (1.0 - math.cos(math.sqrt(square))) / square
         along = (self._prior_weight - across) / square
         xy, xz, yz = along * x * y, along * x * z, along * y * z
-        matrix = [
-            [across + along * x * x, xy, xz],
-            [xy, across + along * y * y, yz],
-            [xz, yz, across + along * z * z],
-        ]
-        return vector, np.array(matrix)
+        xx, yy, zz = across + along * x * x, across + along * y * y, across + along * z * z
+        return vector, np.array((xx, xy, xz, xy, yy, yz, xz, yz, zz)).reshape(3, 3)
 
 
 def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Array | None:
@@ -328,10 +326,9 @@ def _left_jacobian(vector: Array) -> Array:
     c = z / angle
     k = 1.0 - sine
     h = (1.0 - math.cos(angle)) / angle
-    return np.array(
-        [
-            [sine + k * a * a, k * a * b - h * c, k * a * c + h * b],
-            [k * a * b + h * c, sine + k * b * b, k * b * c - h * a],
-            [k * a * c - h * b, k * b * c + h * a, sine + k * c * c],
-        ]
+    rows = (
+        *(sine + k * a * a, k * a * b - h * c, k * a * c + h * b),
+        *(k * a * b + h * c, sine + k * b * b, k * b * c - h * a),
+        *(k * a * c - h * b, k * b * c + h * a, sine + k * c * c),
     )
+    return np.array(rows).reshape(3, 3)
