@@ -26,6 +26,7 @@ __all__ = ["TRIALS", "executors", "kills", "main", "memory", "ray_nodes", "scali
 
 CONDITIONS = ("--station", "conical", "--fidelity", "beacons", "--current", "0:0.5:2", "--attenuation", "0.2:1.2:2")
 KILLS = 10
+START_LIMIT_S = 180.0
 
 
 def kills(folder: Path, episodes: int, seed: int = 0) -> dict[str, Any]:
@@ -94,9 +95,9 @@ def ray_nodes(folder: Path, episodes: int) -> dict[str, Any]:
     second = [ray, "start", "--address", address, "--num-cpus", "1", "--block"]
     nodes = [_background(head)]
     try:
-        time.sleep(15.0)
+        _await_nodes(ray, address, 1)
         nodes.append(_background(second))
-        time.sleep(15.0)
+        _await_nodes(ray, address, 2)
         out = folder / "cluster"
         flags = ("--episodes", str(episodes), "--executor", "ray", "--address", address, "--workers", "2")
         process = subprocess.Popen(_sweep(out, *flags), stdout=subprocess.PIPE, text=True)
@@ -109,9 +110,10 @@ def ray_nodes(folder: Path, episodes: int) -> dict[str, Any]:
         for node in nodes:
             if node.poll() is None:
                 os.killpg(node.pid, signal.SIGTERM)
-    table = read_table(out)
+    if process.returncode:
+        raise RuntimeError(f"the campaign ended with {process.returncode} after {at} episodes")
+    table, summary = read_table(out), json.loads(printed)
     whole = _table(folder / "whole", "--episodes", str(episodes))
-    summary = json.loads(printed)
     return {
         "episodes": table.num_rows,
         "finished_when_the_node_died": at,
@@ -203,6 +205,17 @@ def _table(out: Path, *flags: str) -> Any:  # noqa: ANN401 - pyarrow has no type
 
 def _background(words: Sequence[str]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def _await_nodes(ray: str, address: str, count: int) -> None:
+    deadline = time.monotonic() + START_LIMIT_S
+    while time.monotonic() < deadline:
+        words = [ray, "status", "--address", address]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if done.stdout.count(" node_") >= count:
+            return
+        time.sleep(1.0)
+    raise RuntimeError(f"no {count} nodes at {address} within {START_LIMIT_S:g} s")
 
 
 def _finished(out: Path) -> int:
