@@ -142,6 +142,8 @@ class RotatingPilot:
             wanted = next_rotating_mode(mode, self._facts(state, place, senses), self.cfg.rotating.modes)
         else:
             wanted = next_mode(mode, facts, self.cfg.modes)
+            if wanted == FAR != mode and not self._trusts_lamp(state):
+                wanted = ACQUIRE
             if mode != wanted and wanted == ACQUIRE:
                 state = self._remember(state, place, senses)
         if wanted != mode:
@@ -224,8 +226,7 @@ class RotatingPilot:
             and place.distance_m > 0.0
         )
         lamp = sight is not None and sight.frames >= self.cfg.rotating.modes.steady_sights
-        if beacon is not None and sight is not None:
-            lamp = lamp and abs(math.remainder(sight.azimuth_rad - beacon.bearing_rad, math.tau)) < _LAMP_RAD
+        lamp = lamp and self._trusts_lamp(state)
         in_mode_s = senses.time_s - (flight.since_s or 0.0)
         if beacon is None:
             none = math.inf
@@ -246,6 +247,13 @@ class RotatingPilot:
             in_mode_s=in_mode_s,
         )
 
+    def _trusts_lamp(self, state: RotatingState) -> bool:
+        """Whether the light that is seen lies where the beacon puts the station; without a beacon any light will do."""
+        beacon, sight = state.beacon, state.flight.sight
+        if beacon is None or sight is None or beacon.since_fix_s > self.cfg.rotating.modes.lost_s:
+            return True
+        return abs(math.remainder(sight.azimuth_rad - beacon.bearing_rad, math.tau)) < _LAMP_RAD
+
     def _remember(self, state: RotatingState, place: Place | None, senses: Senses) -> RotatingState:
         """The beacon's place by the array's last poses, for the search after the conical half has lost them."""
         relative = state.flight.relative
@@ -263,8 +271,6 @@ class RotatingPilot:
         flight = self.conical.enter(state.flight, mode, place, senses)
         beacon = state.beacon
         if mode == ACQUIRE:
-            if beacon is not None and state.flight.mode == ACQUIRE:
-                beacon = None
             anchor = beacon.bearing_rad if beacon is not None else senses.yaw_rad
             flight = flight._replace(anchor_rad=anchor)
             state = state._replace(believed=beacon is not None, hunt=Hunt())

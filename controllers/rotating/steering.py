@@ -91,7 +91,7 @@ def look_around(
         heading_rad: where it begins.
         depth_m: depth about which it runs.
         side: +1 turns to port, -1 to starboard.
-        believed: the beacon is believed in that direction: look there longer.
+        believed: the beacon is believed in that direction: look there longer, and let the first leg lead away from it.
         cfg: the look.
     """
     moment = in_mode_s - (cfg.believed_s if believed else cfg.settle_s)
@@ -106,7 +106,7 @@ def look_around(
         moment -= round_s + leg_s
         number += 1
     depth = depth_m + cfg.depth_step_m * (0.0, -1.0, 0.0, 1.0)[number % 4]
-    base = heading_rad + side * 0.5 * math.pi * number
+    base = heading_rad + side * 0.5 * math.pi * (number + (2 if believed else 0))
     if moment < round_s:
         rate = side * cfg.turn_rate_rad_s
         return Steering(AutopilotSetpoint(0.0, 0.0, 0.0, 0.0, base + rate * moment, depth, turn_rad_s=rate))

@@ -50,7 +50,7 @@ def boat_at(azimuth_deg, range_m, yaw_deg, current_m_s=0.0, direction_deg=0.0, z
     return Boat(math.radians(yaw_deg), current_m_s, direction_deg, place)
 
 
-def fly_round(boat, time_s, datum_rad=0.0, seed=1, spoil=lambda percept, time_s: percept, pilot=PILOT):
+def fly_round(boat, time_s, datum_rad=0.0, seed=1, spoil=lambda percept, time_s: percept, pilot=PILOT, clock_s=0.0):
     """Closed loop; yields (command, state after, camera in the station frame (3,))."""
     rng, state = np.random.default_rng(seed), pilot.initial_state()
     for _ in range(round(time_s / DT_S)):
@@ -58,7 +58,7 @@ def fly_round(boat, time_s, datum_rad=0.0, seed=1, spoil=lambda percept, time_s:
         yaw = math.remainder(float(senses.euler_zyx_rad[2]) + datum_rad, math.tau)
         senses = dataclasses.replace(senses, euler_zyx_rad=np.array([*senses.euler_zyx_rad[:2], yaw]))
         percept = look(boat.T_world_body, senses.time_s, rng)
-        percept = dataclasses.replace(percept, azimuth=sweep(boat.T_world_body, senses.time_s, rng))
+        percept = dataclasses.replace(percept, azimuth=sweep(boat.T_world_body, senses.time_s, rng, clock_s=clock_s))
         command, state = pilot.step(state, spoil(percept, senses.time_s), senses)
         yield command, state, (boat.T_world_body @ CAMERA.T_body_camera)[:3, 3] + [0.0, 0.0, STATION.depth_m]
         boat.step(command.values)

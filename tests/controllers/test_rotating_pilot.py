@@ -23,6 +23,7 @@ from auvdock.controllers.rotating.modes import (
     next_rotating_mode,
 )
 from auvdock.controllers.rotating.pilot import RotatingPilot
+from auvdock.controllers.rotating.steering import LookAroundCfg, look_around
 from auvdock.core.contracts import AzimuthFix, Bearing, Detections, Percept, Proprioception
 
 KEEP_OFF_M = 8.0
@@ -89,6 +90,32 @@ def test_searches_again_after_a_blackout():
     assert modes[-1] == "mid"
     assert modes[modes.index(CIRCLE) :].count("acquire") >= 1
     assert least > KEEP_OFF_M
+
+
+def test_a_clock_that_is_50_ms_off_turns_the_axis_by_9_degrees_and_no_more():
+    boat = boat_at(5.0, 26.0, 185.0, 0.1, 0.0)
+    errors = []
+    for command, state, camera_m in fly_round(boat, 60.0, clock_s=0.05):
+        if command.mode == "mid":
+            break
+        if state.beacon is not None:
+            true = math.atan2(camera_m[1], camera_m[0] + 0.3)
+            errors.append(math.degrees(math.remainder(state.beacon.azimuth_rad - true, math.tau)))
+    assert command.mode == "mid"
+    assert np.median(errors) == pytest.approx(9.0, abs=1.5)
+
+
+def test_searching_where_the_beacon_was_believed_leads_away_from_it_first():
+    cfg = LookAroundCfg()
+    turned_s = cfg.believed_s + math.tau / cfg.turn_rate_rad_s + 1.0
+    leg = look_around(turned_s, 0.4, 8.0, 1.0, True, cfg).setpoint
+    assert leg.surge_m_s == cfg.leg_speed_m_s
+    assert math.cos(leg.heading_rad - 0.4) == pytest.approx(-1.0)
+    unknown = look_around(cfg.settle_s + math.tau / cfg.turn_rate_rad_s + 1.0, 0.4, 8.0, 1.0, False, cfg).setpoint
+    assert unknown.heading_rad == pytest.approx(0.4)
+    first = look_around(cfg.settle_s + 1.0, 0.4, 8.0, -1.0, False, cfg).setpoint
+    assert first.turn_rad_s == -cfg.turn_rate_rad_s
+    assert first.heading_rad == pytest.approx(0.4 - cfg.turn_rate_rad_s)
 
 
 def steady_lamp(percept, azimuth_rad):
