@@ -19,7 +19,7 @@ from rich.table import Table
 from auvdock.cli.parsing import parse
 from auvdock.core.errors import GraphicsError
 from auvdock.envs.docking import DockingEnv
-from auvdock.episode.config import EpisodeCfg, level_cfg
+from auvdock.episode.config import AnyEpisodeCfg, landing_level_cfg, level_cfg
 from auvdock.episode.runner import EpisodeRunner
 from auvdock.sim.mj import mujoco
 
@@ -47,6 +47,8 @@ def run(argv: Sequence[str], prog: str) -> int:
         ("pixels", lambda: _episodes("pixels", args.episodes)),
         ("rotating beacons", lambda: _episodes("beacons", args.episodes, "rotating")),
         ("rotating pixels", lambda: _episodes("pixels", args.episodes, "rotating")),
+        ("landing beacons", lambda: _episodes("beacons", args.episodes, "landing")),
+        ("landing pixels", lambda: _episodes("pixels", args.episodes, "landing")),
     ]
     report: dict[str, Any] = {"cores": 1, "machine_cores": os.cpu_count()}
     shown = steps if args.json else track(steps, "measuring", console=Console(stderr=True), transient=True)
@@ -124,6 +126,7 @@ def _episodes(fidelity: str, count: int, station: str = "conical") -> dict[str, 
         "simulated_s": simulated_s,
         "ms_per_frame": {name: 1e3 * spent / frames for name, spent in clock.seconds.items()},
         "share": {name: 1e3 * spent / wall_ms for name, spent in clock.seconds.items()},
+        "latency_ms": clock.latency_ms(),
     }
 
 
@@ -132,6 +135,13 @@ class _StageClock:
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self._calls: dict[str, list[float]] = {}
+
+    def latency_ms(self) -> dict[str, float]:
+        """Time from a frame to its command, perception and pilot together, over all control periods."""
+        parts = zip(self._calls["perception"], self._calls["pilot"], strict=False)
+        spent = 1e3 * np.array([sum(part) for part in parts])
+        return {"median": float(np.median(spent)), "p95": float(np.percentile(spent, 95.0)), "max": float(spent.max())}
 
     def attach(self, runner: EpisodeRunner) -> None:
         self._wrap(runner.world, "step", "physics")
@@ -142,19 +152,23 @@ class _StageClock:
     def _wrap(self, owner: Any, method: str, name: str) -> None:  # noqa: ANN401
         original = getattr(owner, method)
         self.seconds[name] = 0.0
+        calls = self._calls.setdefault(name, [])
 
         def timed(*args: Any) -> Any:  # noqa: ANN401
             start = time.perf_counter()
             try:
                 return original(*args)
             finally:
-                self.seconds[name] += time.perf_counter() - start
+                spent = time.perf_counter() - start
+                self.seconds[name] += spent
+                calls.append(spent)
 
         object.__setattr__(owner, method, timed)
 
 
-def _cfg(fidelity: str, station: str = "conical") -> EpisodeCfg:
-    return level_cfg(1, station).override({"world": {"fidelity": fidelity}})
+def _cfg(fidelity: str, station: str = "conical") -> AnyEpisodeCfg:
+    change = {"world": {"fidelity": fidelity}}
+    return landing_level_cfg(1).override(change) if station == "landing" else level_cfg(1, station).override(change)
 
 
 def _print(report: dict[str, Any]) -> None:

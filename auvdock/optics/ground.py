@@ -26,6 +26,7 @@ class Ground:
         x = (np.arange(_COLUMNS) + 0.5) * camera.width_px / _COLUMNS - 0.5
         y = (np.arange(_ROWS) + 0.5) * camera.height_px / _ROWS - 0.5
         pixels = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
+        self._pixels = pixels
         self._rays = camera.rays(pixels)
         self._solid = scene.lit.lens.solid_angle_at(pixels)[:, None]
         self._white = tag_cells(scene.tag.tag_id)
@@ -52,9 +53,7 @@ class Ground:
         light = unit * reflectance[:, None] + veil
         if lit.lamp is not None:
             middle = float(np.median(reach))
-            light += lit.lamp.backscatter_at(self._rays[:: len(self._rays) // 4], middle).mean(axis=0) @ (
-                lit.electrons_per_j.T
-            )
+            light += lit.lamp.backscatter_near(self._pixels, middle) @ lit.electrons_per_j.T
         return light * self._solid
 
     def _put_tag(self, local: Array, reflectance: Array) -> None:

@@ -150,6 +150,17 @@ class VehicleLamp:
         upper += lower
         return upper
 
+    def backscatter_near(self, pixels: Array, distance_m: float) -> Array:
+        """(n, 3) backscattered radiance at pixels (n, 2) up to one distance, from the table."""
+        _, height, width, _ = self._table.shape
+        columns = np.clip(pixels[:, 0] / self._factor, 0, width - 1).astype(np.int64)
+        rows = np.clip(pixels[:, 1] / self._factor, 0, height - 1).astype(np.int64)
+        place = math.log(min(max(distance_m, _FIRST_M), _LAST_M) / _FIRST_M)
+        place *= (_NODES - 1) / math.log(_LAST_M / _FIRST_M)
+        node = min(int(place), _NODES - 2)
+        lower, upper = self._table[node, rows, columns], self._table[node + 1, rows, columns]
+        return (lower + (upper - lower) * np.float32(place - node)).astype(np.float64)
+
     def backscatter_at(self, rays: Array, distance_m: float) -> Array:
         """(n, 3) backscattered radiance along unit rays (n, 3) up to one distance: the integral itself."""
         return self._integrate(rays, np.array([max(distance_m, 2.0 * _FIRST_M)]))[:, 0]
@@ -178,6 +189,7 @@ class VehicleLamp:
             for layer in radiance
         ]
         self._table = np.ascontiguousarray(np.array(table, dtype=np.float32))
+        self._factor = lens.factor
         self._pixels = height * width
         self._column = np.arange(self._pixels, dtype=np.int32).reshape(height, width)
 

@@ -102,7 +102,9 @@ class TagScene:
         solid = lit.lens.rad_per_px**2
         around = veil[0] * solid + self._halos_e_s(view, ray[0] / distance)
         if lit.lamp is not None:
-            around += lit.lamp.backscatter_at(ray / distance, distance)[0] @ lit.electrons_per_j.T * solid
+            around += (
+                lit.lamp.backscatter_near(corners.mean(axis=0)[None, :], distance)[0] @ lit.electrons_per_j.T * solid
+            )
         white = unit[0] * (self.tag.reflectance * solid)
         return TagView(corners, float(edges.mean()) / SQUARE_CELLS, inside, white, white * BLACK_SHARE, around)
 

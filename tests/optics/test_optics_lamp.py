@@ -56,6 +56,8 @@ def test_backscatter_table_is_the_integral(name, distance_m):
         assert unit.backscatter_at(ray[None, :], distance_m)[0] == pytest.approx(wanted, rel=2e-3)
         # The table interpolates over 40 depths and a grid of 32 px.
         assert table[row, column] == pytest.approx(wanted, rel=0.03)
+        pixel = (np.array([[column, row]]) + 0.5) * LENS.factor - 0.5
+        assert unit.backscatter_near(pixel, distance_m)[0] == pytest.approx(table[row, column], rel=1e-4)
 
 
 def test_backscatter_vanishes_without_water_and_grows_with_scattering():

@@ -61,9 +61,10 @@ class AprilTagDetector:
         # A tag in haze has little contrast: OpenCV's 7 levels would drown it.
         settings.adaptiveThreshConstant = 3
         settings.minMarkerPerimeterRate = 0.05
-        # The white margin's outline runs one cell outside the black square: at OpenCV's 0.125 of the side the two count
-        # as one candidate, and of a tag turned by some 30° the outer one is often kept, which holds no code.
-        settings.minMarkerDistanceRate = 0.01
+        # The white margin's outline runs one cell outside the black square, its corners 0.044 of the perimeter away. At
+        # OpenCV's 0.125 the two count as one candidate, and of a tag turned by some 30° the outer one is often kept,
+        # which holds no code. Far below, the inner side of the black border is taken for a square of its own.
+        settings.minMarkerDistanceRate = 0.04
         self._detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(_FAMILY), settings)
 
     def __reduce__(self) -> tuple[type[AprilTagDetector], tuple[()]]:
