@@ -55,7 +55,7 @@ class FlashModelCfg:
     peak."""
     box_scale: float = 1.0
     """Size of the box over the size of the part that is brighter than half of the peak."""
-    centre_shift: float = 0.45
+    centre_shift: float = 0.65
     """Shift of the centre along the beam over the shift of the box's middle."""
     centre_spread: float = 0.06
     """Standard deviation of the centre per axis over the box's mean half side, at a contrast of ten times the noise."""

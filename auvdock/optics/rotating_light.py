@@ -155,6 +155,8 @@ class RotatingLight:
         excess = wide_angle_phase(apart + phi, self._theta0) * np.exp(-self._a * (s + d))
         light = self._flux * self._b / (r * math.sin(apart)) * excess.sum(axis=1) * step
         lead = float(self._spread.lead_rad(np.array([self._b * r]), np.array([angle]))[0])
+        # One turn stands out only beyond what many small ones make, some θ0 b r / 2; within, the halo stays a whole.
+        lead *= lead / (lead + 0.5 * self._theta0 * self._b * r + 1e-9)
         border = edge.copy()
         border[0] = _AT_LAMP * edge[1]
         beyond = (1.0 + border / max(lead, 1e-6)) ** -2

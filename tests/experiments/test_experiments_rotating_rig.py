@@ -40,7 +40,7 @@ def test_brightest_when_the_beam_points_at_the_camera(rig):
 def test_arc_shrinks_with_range(rig):
     detector = ShrunkDetector(ThresholdDetector(), SMALL)
     near, far, beyond = (
-        flash_visibility(rig, detector, 1.5, y_m, day=False, step_deg=6.0, reach_deg=42.0) for y_m in (20.0, 47.0, 70.0)
+        flash_visibility(rig, detector, 1.5, y_m, day=False, step_deg=6.0, reach_deg=42.0) for y_m in (20.0, 56.0, 85.0)
     )
     assert near.arc_deg > far.arc_deg > 0.0
     assert near.facing_share == far.facing_share == 1.0
