@@ -16,7 +16,8 @@ from auvdock.perception.rotating.motion import CameraPlace
 __all__ = ["Candidate", "Candidates", "Pass", "Spot", "merge_spots"]
 
 _KNOWN = 20
-"""Frames that make a light known (ours): more than a flash and its halo's parts last."""
+_STEADY = 0.6
+"""A light in view for 20 frames or more and seen in six of ten is a lamp (ours): a flash is seen in fewer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,11 @@ class Candidate:
     judged_s: float = -math.inf
     chain: list[Pass] = field(default_factory=list[Pass])
     hits: int = 0
+
+    @property
+    def lamp(self) -> bool:
+        """Whether the light is there most of the time: no flash."""
+        return len(self.seen) >= _KNOWN and sum(self.seen) >= _STEADY * len(self.seen)
 
     def add(self, time_s: float, spot: Spot, ray_compass: Array, keep_s: float) -> None:
         """One frame in which the light was seen."""
@@ -198,13 +204,15 @@ class Candidates:
         in_view = self._in_view(place)
         keep_s = 2.5 * self._turn_s
         by_candidate = {id(candidate): index for index, candidate in owner.items()}
+        of_lamps = {index for index, candidate in owner.items() if candidate.lamp}
         for candidate, visible in zip(self.all, in_view.tolist(), strict=True):
             index = by_candidate.get(id(candidate))
-            if index is not None:
+            alone = index is not None and (candidate.lamp or candidate is kept)
+            shared = index if alone else self._shared(candidate, rays, of_lamps)
+            if index is not None and (shared is None or shared >= index):
                 candidate.add(place.time_s, spots[index], rays[index], keep_s)
             elif visible:
                 # Two lights that melt into one from time to time share its brightness then.
-                shared = self._nearest(candidate, rays)
                 if shared is None:
                     candidate.share(place.time_s, None, None, keep_s)
                 else:
@@ -241,17 +249,24 @@ class Candidates:
         return owner
 
     def _lamp(self, ray: Array, cosine: float, beacon: Candidate) -> bool:
-        """Whether a spot is a light known from many frames, nearer to that than to the beacon."""
+        """Whether a spot is a lamp's, nearer to that than to the beacon."""
         gate = max(cosine, self._gate_cosine)
-        return any(c is not beacon and c.hits >= _KNOWN and float(ray @ c.ray_compass) > gate for c in self.all)
+        return any(c is not beacon and float(ray @ c.ray_compass) > gate and c.lamp for c in self.all)
+
+    def _shared(self, candidate: Candidate, rays: list[Array], of_lamps: set[int]) -> int | None:
+        """The spot that a candidate may be part of.
+
+        A lamp without a spot of its own melts into the nearest within the merging distance. A flash is the brightest
+        spot near it that is no lamp's: a faint one's halo has its centre now here, now there, and falls apart.
+        """
+        if not candidate.lamp:
+            near = (k for k, ray in enumerate(rays) if float(ray @ candidate.ray_compass) >= self._flash_cosine)
+            return next((k for k in near if k not in of_lamps), self._nearest(candidate, rays))
+        return self._nearest(candidate, rays)
 
     def _nearest(self, candidate: Candidate, rays: list[Array]) -> int | None:
-        """The spot that a candidate without one of its own may be part of.
-
-        Known lamps look no farther than the merging distance. A light that was seen in few frames is a flash, and a
-        faint flash's halo has its centre now here, now there.
-        """
-        best, index = (self._merge_cosine if candidate.hits >= _KNOWN else self._flash_cosine), None
+        """The nearest spot within the merging distance."""
+        best, index = self._merge_cosine, None
         for k, ray in enumerate(rays):
             if (cosine := float(ray @ candidate.ray_compass)) >= best:
                 best, index = cosine, k
