@@ -7,6 +7,7 @@ import dataclasses
 import json
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -165,7 +166,8 @@ def run(argv: Sequence[str], prog: str) -> int:
     if store.is_mixed:
         print("auvdock: earlier episodes were run by other versions; rows may not repeat", file=sys.stderr)
     observer = SweepProgress(Console(stderr=True), executor.workers, quiet=args.json)
-    summary = run_campaign(cfg, DockingJob(cfg), store, executor, observer)
+    with redirect_stdout(sys.stderr):  # Ray tells of lost nodes on standard output, which belongs to the summary
+        summary = run_campaign(cfg, DockingJob(cfg), store, executor, observer)
     if args.json:
         print(json.dumps(_plain(summary), allow_nan=False))
     else:
