@@ -139,7 +139,8 @@ def tick(
         T_station_camera = off @ invert(simulator.T_world_station) @ truth.T_world_body @ WORLD.camera.T_body_camera
         pose = PoseEstimate(T_station_camera, np.eye(6), (), "test", 0.0, measured=measured)
     percept = LandingPercept(0.0, pose, None, None, 0, Detections.empty(), level=level)
-    own = Proprioception(0.0, 10.0, *(np.zeros(3) for _ in range(4)))
+    zero = np.zeros(3)
+    own = Proprioception(0.0, 10.0, zero, zero, zero, zero)
     return Tick(truth, own, None, percept, Command(np.zeros(8), mode=mode))
 
 
