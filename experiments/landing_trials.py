@@ -67,7 +67,7 @@ class LandingWatch:
     """Runs all three perceptions on a flight's frames and keeps their errors; an `EpisodeObserver`."""
 
     def __init__(self, perception: LandingPerceptionCfg) -> None:
-        """Keep the settings that the three share."""
+        """Keep the settings of the perception that flies; the other two share them but for their levels."""
         self._cfg = perception
         self._rows: list[tuple[float, bool, float, Array, Array]] = []
         self._errors: dict[str, list[Array]] = {name: [] for name in LEVELS}
@@ -84,7 +84,9 @@ class LandingWatch:
         self._T_body_camera = setup.camera.T_body_camera
         self._seat = np.append(setup.vehicle.seat_body_m, 1.0)
         self._eyes = {
-            name: LandingPerception(_with_levels(self._cfg, name), setup.camera, setup.station) for name in LEVELS
+            name: LandingPerception(_with_levels(self._cfg, name), setup.camera, setup.station)
+            for name in LEVELS
+            if name != self._cfg.levels
         }
 
     def on_tick(self, tick: Tick) -> None:
@@ -93,8 +95,9 @@ class LandingWatch:
         if not isinstance(percept, LandingPercept) or tick.truth.latched:
             return
         T_true = self._T_station_world @ tick.truth.T_world_body
-        for name, eye in self._eyes.items():
-            seen = eye.update(percept.detections, percept.tags, tick.proprioception)
+        for name in LEVELS:
+            eye = self._eyes.get(name)
+            seen = eye.update(percept.detections, percept.tags, tick.proprioception) if eye is not None else percept
             self._errors[name].append(self._error(seen, T_true))
             self._measured[name].append(seen.pose is not None and seen.pose.measured)
         flown = np.full(4, math.nan)
@@ -185,9 +188,10 @@ def fly_trials(
     """Fly every seed by each of the given levels; `advance` is called after each flight."""
     trials: list[LandingTrial] = []
     for name in levels:
-        runner = EpisodeRunner(cfg.override({"perception": {"levels": name}}))
+        flown = cfg.override({"perception": {"levels": name}})
+        runner = EpisodeRunner(flown)
         for seed in seeds:
-            watch = LandingWatch(cfg.perception)
+            watch = LandingWatch(flown.perception)
             runner.run(seed, [watch])
             trials.append(watch.trial(seed, name))
             if advance is not None:

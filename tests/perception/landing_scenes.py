@@ -12,6 +12,7 @@ from auvdock.core.arrays import Array, Image
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, Detections, Frame, Proprioception, TagDetection
 from auvdock.core.landing_station import load_landing_station
+from auvdock.core.response import CameraResponse
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx, rotation_looking_along
 from auvdock.perception.landing.tag import tag_corners_m
 from auvdock.sim.sensors import SensorCfg, Sensors
@@ -120,10 +121,10 @@ def tag_frame(
     blur_px: float = 0.8,
     noise_dn: float = 2.0,
 ) -> Frame:
-    """A frame of the tag through the distorting lens, four samples a pixel each way, blurred and noisy."""
+    """The tag through the distorting lens, two samples a pixel each way, blurred and noisy; codes linear in light."""
     marker = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11), tag_id, 8)
     cells = np.pad(np.asarray(marker, dtype=np.float64) / 255.0, 1, constant_values=1.0)
-    fine = 4
+    fine = 2
     grid = (np.arange(800 * fine) + 0.5) / fine - 0.5, (np.arange(600 * fine) + 0.5) / fine - 0.5
     coarse_u, coarse_v = np.meshgrid(np.linspace(-1, 800, 101), np.linspace(-1, 600, 76))
     xy = CAMERA.normalise(np.column_stack([coarse_u.ravel(), coarse_v.ravel()]))
@@ -148,4 +149,4 @@ def tag_frame(
     if rng is not None:
         image = image + rng.normal(0.0, noise_dn, image.shape)
     grey: Image = np.clip(np.round(image), 0, 255).astype(np.uint8)
-    return Frame(np.repeat(grey[:, :, None], 3, axis=2), 0.0, CAMERA)
+    return Frame(np.repeat(grey[:, :, None], 3, axis=2), 0.0, CAMERA, response=CameraResponse(encoding="linear"))

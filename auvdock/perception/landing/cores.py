@@ -140,7 +140,7 @@ def _centre(image: Image, box: IntArray, cut: float) -> Array:
     weight = np.maximum(patch - min(float(rim), cut), 0.0)
     total = float(weight.sum())
     if not total > 0.0:
-        return 0.5 * (box[:2] + box[2:] - 1.0)
+        return 0.5 * (box[:2] + box[2:] - 1).astype(np.float64)
     column = float(weight.sum(axis=0) @ np.arange(weight.shape[1])) / total
     row = float(weight.sum(axis=1) @ np.arange(weight.shape[0])) / total
     return np.array([x0 + column, y0 + row])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -92,7 +93,7 @@ class TagLevel:
 
     def _pose(self, tag: TagDetection, attitude: Array, expected: Array | None) -> LevelPose | None:
         xy = self._camera.normalise(tag.corners_px)
-        sigma = np.full(4, tag.sigma_px)
+        sigma = np.full(4, math.hypot(tag.sigma_px, self._cfg.corner_sigma_px))
         if expected is not None:
             # The attitude's share of the cost tells the wrong of a square's two poses: it is tens of degrees off.
             tracked = self._solver.solve(self._corners_m, tag.corners_px, sigma, attitude, expected, (), "tracked")
