@@ -65,13 +65,15 @@ def test_a_late_clock_is_nine_degrees() -> None:
 
 @pytest.mark.render
 def test_one_place_in_pixels() -> None:
-    """Both methods on the same frames: ours within 0.7° and near nothing in deviation, the paper's within a frame."""
+    """Both methods on the same frames: ours within 0.7° and near nothing in deviation, the paper's within its pass."""
     found = watch(Place(1.5, 30.0, False), 0, 4, "pixels")
     assert len(found.ours_deg) >= 1
     assert max(abs(error) for error in found.ours_deg) < 0.7
     assert max(abs(error) for error in found.ours_deviation_deg) < 0.1
     assert len(found.paper_deg) >= 3
-    assert max(abs(error) for error in found.paper_deg) < 9.0
+    # It picks one of the pass's frames, which lie 6° apart on both sides of the peak.
+    for error, frames in zip(found.paper_deg, found.run, strict=True):
+        assert abs(error) < 6.0 * frames
     assert found.bound_deg is not None
     assert 0.0 < found.bound_deg < 0.1
 
