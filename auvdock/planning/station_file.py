@@ -22,7 +22,8 @@ def with_lights(station: ConicalStationCfg, layout: BeaconLayout) -> ConicalStat
 
 def station_toml(station: ConicalStationCfg) -> str:
     """The station as TOML."""
-    plain: dict[str, Any] = to_plain(station)
+    # TOML has no null: what the station lacks stays away, as in the presets.
+    plain: dict[str, Any] = {key: value for key, value in to_plain(station).items() if value is not None}
     lines = [f"{key} = {_value(value)}" for key, value in plain.items() if not isinstance(value, dict | list)]
     for key, value in plain.items():
         if isinstance(value, dict):

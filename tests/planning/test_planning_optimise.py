@@ -110,8 +110,9 @@ def test_probing_agrees_with_the_voxels():
     assert probed == pytest.approx(guidance_space(layout, PlanCfg(resolution=28)).volume_m3, rel=0.05)
 
 
-def test_station_file_reads_back(tmp_path):
-    station = load_conical_station()
+@pytest.mark.parametrize("preset", ["conical", "rotating"])
+def test_station_file_reads_back(tmp_path, preset):
+    station = load_conical_station(preset)
     station = with_lights(station, station.layout)
     write_station(tmp_path / "station.toml", station)
     assert load_toml(ConicalStationCfg, tmp_path / "station.toml") == station
