@@ -22,10 +22,12 @@ CHILD = """
 import sys, time
 from pathlib import Path
 from synthetic_episode import make_setup, ticks
-from auvdock.recording.rerun_recorder import RerunRecorder
+from auvdock.recording import rerun_recorder
 
+# Batches by size alone, so that a slow machine cuts them where a fast one does; the half second has its own test.
+rerun_recorder._BATCH_WALL_S = 1e9
 setup = make_setup(160, 90)
-recorder = RerunRecorder(Path(sys.argv[1]))
+recorder = rerun_recorder.RerunRecorder(Path(sys.argv[1]))
 written = 0
 try:
     recorder.on_start(setup)
