@@ -13,7 +13,7 @@ from auvdock.campaign.config import CampaignCfg, campaign_from_plain, load_campa
 from auvdock.campaign.plan import Plan
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import to_plain
-from auvdock.episode.config import level_cfg
+from auvdock.episode.config import EpisodeCfg, level_cfg
 
 CAMPAIGNS = sorted((Path(__file__).resolve().parents[2] / "experiments" / "campaigns").glob("*.toml"))
 
@@ -104,6 +104,7 @@ def test_a_point_arrives_in_the_episode_s_configuration():
     )
     cfg = CampaignCfg(axes=axes, episode={"world": {"fidelity": "beacons"}})
     episode = Plan(cfg).config(Plan(cfg)[0])
+    assert isinstance(episode, EpisodeCfg)
     assert episode.world.fidelity == "beacons"
     assert (episode.world.sim.current.speed_m_s, episode.world.sim.current.direction_deg) == (0.25, 90.0)
     assert not episode.world.start.random_current_direction

@@ -86,12 +86,12 @@ def test_dead_reckoning_of_the_camera() -> None:
     rng = np.random.default_rng(3)
     motion, dt = CameraMotion(CAMERA), 1.0 / 30.0
     lever = CAMERA.T_body_camera[:3, 3]
-    place, start = np.zeros(3), None
+    place = np.zeros(3)
+    start = camera = place + lever
     for k in range(1200):
         yaw = 0.1 * k * dt
         rotation = rotation_from_euler_zyx(0.0, 0.0, yaw)
         camera = place + rotation @ lever
-        start = camera.copy() if start is None else start
         euler = np.array([0.0, 0.0, wrap_angle(yaw + 1.0)]) + 0.0035 * rng.standard_normal(3)
         gyro = np.array([0.0, 0.0, 0.1]) + 0.0005 * rng.standard_normal(3)
         velocity = np.array([0.5, 0.0, 0.0]) + 0.003 * rng.standard_normal(3)

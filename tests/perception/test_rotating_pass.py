@@ -27,7 +27,7 @@ def test_profile_is_half_at_half_the_divergence_without_scattering() -> None:
 def test_peak_between_frames_without_noise(frames: int, widening: float) -> None:
     """Any phase, even from two visible frames: within 1° where frames lie 6° apart, 0.15° from three on."""
     for phase in np.linspace(-0.5, 0.5, 9):
-        angle = STEP * np.arange(-4, 5)
+        angle = STEP * np.arange(-4.0, 5.0)
         light = pass_profile(angle - phase * STEP, BEAM, widening)
         order = np.sort(light)[::-1]
         limit = math.sqrt(order[frames - 1] * order[frames])
@@ -41,7 +41,7 @@ def test_peak_between_frames_without_noise(frames: int, widening: float) -> None
 
 def test_a_single_sample_gives_its_own_time_with_a_wide_sigma() -> None:
     """One visible frame tells the peak to some frames' half, and says so."""
-    angle = 0.3 + STEP * np.arange(-2, 3)
+    angle = 0.3 + STEP * np.arange(-2.0, 3.0)
     seen = np.array([False, False, True, False, False])
     fit = fit_pass(angle, np.ones(5), np.full(5, 0.05), seen, BEAM)
     assert abs(fit.offset_rad - 0.3) < math.radians(3.0)
@@ -56,7 +56,7 @@ def _monte_carlo(signal: PassSignal, n: int, seed: int) -> tuple[float, float]:
     error, told = [], []
     for _ in range(n):
         phase = rng.uniform(-0.5, 0.5)
-        angle = STEP * np.arange(-7, 8)
+        angle = STEP * np.arange(-7.0, 8.0)
         mean = signal.peak_e * pass_profile(angle - phase * STEP, BEAM, signal.widening)
         noise = np.sqrt(mean + signal.background_e + signal.read_variance_e2)
         flux = mean + noise * rng.standard_normal(len(angle))

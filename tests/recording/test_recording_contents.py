@@ -13,6 +13,7 @@ from recording_reader import Recording
 from synthetic_episode import MODES, POSE_OFFSET_STATION_M, YAW_ERROR_DEG, make_result, make_setup, ticks
 
 from auvdock.core.contracts import RED, Bearing
+from auvdock.core.station import ConicalStationCfg
 from auvdock.episode.trace import EpisodeSetup, Tick
 from auvdock.recording import paths
 from auvdock.recording.rerun_recorder import RerunRecorder
@@ -162,6 +163,7 @@ def test_plots_hold_the_episode(recording: Recording, setup: EpisodeSetup, episo
 
 
 def test_scene_has_the_station_as_it_is(recording: Recording, setup: EpisodeSetup) -> None:
+    assert isinstance(setup.station, ConicalStationCfg)
     layout = setup.station.layout
     np.testing.assert_allclose(recording.static(paths.LIGHTS, "Points3D:positions"), layout.positions_m, atol=1e-6)
     for beacon in layout.beacons:
