@@ -144,7 +144,10 @@ def test_interrupt_leaves_a_readable_recording(tmp_path):
     ]
     process = subprocess.Popen([sys.executable, "-m", "auvdock.cli", *words], stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline and (not path.exists() or path.stat().st_size < 20_000):
+    sizes: set[int] = set()
+    while time.monotonic() < deadline and len(sizes) < 4:  # the scene first, then a batch every half second
+        if path.exists() and path.stat().st_size >= 20_000:
+            sizes.add(path.stat().st_size)
         time.sleep(0.1)
     os.kill(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60)
