@@ -6,12 +6,14 @@ can be compared pair by pair.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import statistics
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,7 @@ from auvdock.episode.config import EpisodeCfg, level_cfg
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
 from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.experiments.kept import Kept
 
 __all__ = [
     "ARMS",
@@ -147,6 +150,7 @@ def fly_arm(
     fidelity: str = "beacons",
     workers: int = 1,
     done: Callable[[], object] = lambda: None,
+    kept: Kept | None = None,
 ) -> tuple[Flight, ...]:
     """Fly the seeds, in order whatever the number of processes.
 
@@ -156,22 +160,35 @@ def fly_arm(
         fidelity: "beacons" or "pixels".
         workers: processes.
         done: called after each episode.
+        kept: holds earlier flights, which are not flown again, and takes each new one as it ends.
     """
-    flights: list[Flight] = []
-    if workers <= 1:
-        runner = EpisodeRunner(arm_cfg(arm, fidelity))
-        for seed in seeds:
-            flights.append(_fly(runner, seed))
+    kept = kept or Kept()
+    cfg = arm_cfg(arm, fidelity)
+    digest = hashlib.sha256(json.dumps(to_plain(cfg), sort_keys=True).encode()).hexdigest()
+    flights: dict[int, Flight] = {}
+
+    def key(seed: int) -> dict[str, object]:
+        return {"arm": arm.name, "config_sha256": digest, "seed": seed}
+
+    def keep(flight: Flight) -> None:
+        kept.add(key(flight.seed), flight)
+        flights[flight.seed] = flight
+        done()
+
+    for seed in seeds:
+        if (flight := kept.find(Flight, key(seed))) is not None:
+            flights[seed] = flight
             done()
-        return tuple(flights)
-    with ProcessPoolExecutor(workers) as pool:
-        chunks = [list(seeds[start : start + 4]) for start in range(0, len(seeds), 4)]
-        waiting = [pool.submit(fly_arm, arm, chunk, fidelity) for chunk in chunks]
-        for finished in as_completed(waiting):
-            for flight in finished.result():
-                flights.append(flight)
-                done()
-    return tuple(sorted(flights, key=lambda flight: flight.seed))
+    missing = [seed for seed in seeds if seed not in flights]
+    if workers <= 1:
+        runner = EpisodeRunner(cfg)
+        for seed in missing:
+            keep(_fly(runner, seed))
+    else:
+        with ProcessPoolExecutor(workers) as pool:
+            for finished in as_completed([pool.submit(_fly_alone, cfg, seed) for seed in missing]):
+                keep(finished.result())
+    return tuple(flights[seed] for seed in seeds)
 
 
 def summarise(arm: Arm, flights: Sequence[Flight]) -> ArmSummary:
@@ -233,7 +250,11 @@ class _Path:
 def _fly(runner: EpisodeRunner, seed: int) -> Flight:
     path = _Path()
     result = runner.run(seed, [path])
-    return Flight(seed, result, tuple(path.places))
+    return Flight(seed, replace(result, config={}, versions={}), tuple(path.places))
+
+
+def _fly_alone(cfg: EpisodeCfg, seed: int) -> Flight:
+    return _fly(EpisodeRunner(cfg), seed)
 
 
 def _rate(flights: Sequence[Flight]) -> Rate:

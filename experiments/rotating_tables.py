@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.experiments.kept import Kept
 from auvdock.experiments.rotating_rig import X_M, Y_M
 from auvdock.experiments.rotating_watch import SCENARIOS, Place, Scenario, Watch, watch
 
@@ -130,8 +131,9 @@ def run_videos(
     turns: int,
     fidelity: str,
     workers: int = 1,
-    tick: Callable[[], object] | None = None,
+    tick: Callable[[], object] = lambda: None,
     scenario: Scenario | None = None,
+    kept: Kept | None = None,
 ) -> list[Watch]:
     """Videos of every place, seeds 0 to `videos` - 1, in the order of the places.
 
@@ -143,22 +145,34 @@ def run_videos(
         workers: processes.
         tick: called after each video.
         scenario: what spoils the sight.
+        kept: holds earlier videos' errors, and takes each new one's.
     """
+    kept = kept or Kept()
     jobs = [(place, seed, turns, fidelity, scenario) for place in places for seed in range(videos)]
-    done: list[Watch | None] = [None] * len(jobs)
-    if workers == 1:
-        for k, job in enumerate(jobs):
-            done[k] = watch(*job)
-            if tick is not None:
-                tick()
+    names = ("place", "seed", "turns", "fidelity", "scenario")
+    keys: list[dict[str, object]] = [dict(zip(names, job, strict=True)) for job in jobs]
+    done: dict[int, Watch] = {}
+
+    for k, key in enumerate(keys):
+        if (result := kept.find(Watch, key)) is not None:
+            done[k] = result
+            tick()
+
+    def keep(k: int, result: Watch) -> None:
+        kept.add(keys[k], result)
+        done[k] = result
+        tick()
+
+    missing = [k for k in range(len(jobs)) if k not in done]
+    if workers <= 1:
+        for k in missing:
+            keep(k, watch(*jobs[k]))
     else:
         with ProcessPoolExecutor(workers) as pool:
-            waiting = {pool.submit(watch, *job): k for k, job in enumerate(jobs)}
+            waiting = {pool.submit(watch, *jobs[k]): k for k in missing}
             for future in as_completed(waiting):
-                done[waiting[future]] = future.result()
-                if tick is not None:
-                    tick()
-    return [result for result in done if result is not None]
+                keep(waiting[future], future.result())
+    return [done[k] for k in range(len(jobs))]
 
 
 def limits(watches: Sequence[Watch]) -> list[Limit]:
@@ -182,12 +196,17 @@ def limits(watches: Sequence[Watch]) -> list[Limit]:
 
 
 def scenario_rows(
-    videos: int, turns: int, fidelity: str, workers: int = 1, tick: Callable[[], object] | None = None
+    videos: int,
+    turns: int,
+    fidelity: str,
+    workers: int = 1,
+    tick: Callable[[], object] = lambda: None,
+    kept: Kept | None = None,
 ) -> list[ScenarioRow]:
     """The scenarios at the reference position."""
     rows: list[ScenarioRow] = []
     for scenario in SCENARIOS:
-        watches = run_videos([REFERENCE], videos, turns, fidelity, workers, tick, replace(scenario))
+        watches = run_videos([REFERENCE], videos, turns, fidelity, workers, tick, scenario, kept)
         signed = [error for w in watches for error in w.ours_deg]
         rows.append(
             ScenarioRow(

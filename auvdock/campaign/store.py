@@ -7,14 +7,13 @@ death between the two leaves rows in both, which reading takes once.
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import json
 import os
-from collections.abc import Generator, Iterable
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -22,6 +21,7 @@ import pyarrow.parquet as pq
 
 from auvdock.campaign.config import CampaignCfg, campaign_from_plain
 from auvdock.campaign.errors import CampaignError
+from auvdock.campaign.journal import Journal, read_journal, readable_errors
 from auvdock.campaign.row import Row, columns
 from auvdock.core.errors import ConfigError
 
@@ -79,7 +79,7 @@ def read_table(folder: Path) -> pa.Table:
     """
     wanted = schema(read_campaign(folder))
     tables = [_read_shard(path, wanted) for path in sorted(folder.glob(SHARDS))]
-    tables.append(pa.Table.from_pylist(_read_journal(folder / JOURNAL), wanted))
+    tables.append(pa.Table.from_pylist(read_journal(folder / JOURNAL), wanted))
     table = pa.concat_tables(tables)
     episodes, first = np.unique(table.column("episode").to_numpy(), return_index=True)
     return table.take(first) if len(episodes) else table
@@ -103,7 +103,7 @@ class Store:
         self.folder = folder
         self._schema = schema(cfg)
         self._shard_rows = max(100, cfg.episodes // 100)
-        with _readable(folder):
+        with readable_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -125,12 +125,12 @@ class Store:
                 leftover.unlink()
             rows = read_table(folder).column("episode").to_pylist() if resume else []
             self.finished: set[int] = set(rows)
-            self._fresh = _without(_read_journal(folder / JOURNAL), self._in_shards())
-            self._journal = self._open_journal()
+            self._fresh = _without(read_journal(folder / JOURNAL), self._in_shards())
+            self._journal = Journal(folder / JOURNAL)
             if self._fresh:
                 self.flush()
             else:
-                self._empty_journal()
+                self._journal.empty()
         except BaseException:
             os.close(self._lock)
             raise
@@ -141,10 +141,7 @@ class Store:
         Raises:
             CampaignError: it cannot be written; what was written before stays.
         """
-        line = json.dumps(row, allow_nan=False)
-        with _readable(self.folder):
-            self._journal.write(line + "\n")
-            self._journal.flush()
+        self._journal.add(row)
         self._fresh.append(row)
         self.finished.add(int(row["episode"] or 0))
         if len(self._fresh) >= self._shard_rows:
@@ -158,7 +155,7 @@ class Store:
         name = f"rows-{max(numbers, default=-1) + 1:06d}.parquet"
         temporary = self.folder / f"{TEMPORARY}{name}"
         ordered = sorted(self._fresh, key=lambda row: int(row["episode"] or 0))
-        with _readable(self.folder):
+        with readable_errors(self.folder):
             try:
                 pq.write_table(pa.Table.from_pylist(ordered, self._schema), temporary)
                 _sync(temporary)
@@ -169,7 +166,7 @@ class Store:
                     temporary.unlink(missing_ok=True)
                 raise
         self._fresh = []
-        self._empty_journal()
+        self._journal.empty()
 
     def close(self) -> None:
         """Flush and give the folder free."""
@@ -180,8 +177,7 @@ class Store:
 
     def abandon(self) -> None:
         """Give the folder free as it is; the journal keeps what is in no shard."""
-        with suppress(OSError):
-            self._journal.close()
+        self._journal.close()
         with suppress(OSError):
             os.close(self._lock)
 
@@ -193,7 +189,7 @@ class Store:
 
     def _write_manifest(self, manifest: dict[str, Any]) -> None:
         temporary = self.folder / f"{TEMPORARY}{MANIFEST}"
-        with _readable(self.folder):
+        with readable_errors(self.folder):
             temporary.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
             _sync(temporary)
             temporary.rename(self.folder / MANIFEST)
@@ -203,14 +199,6 @@ class Store:
         for path in self.folder.glob(SHARDS):
             found.update(_read_shard(path, self._schema).column("episode").to_pylist())
         return found
-
-    def _open_journal(self) -> TextIO:
-        with _readable(self.folder):
-            return (self.folder / JOURNAL).open("a", encoding="utf-8")
-
-    def _empty_journal(self) -> None:
-        with _readable(self.folder):
-            self._journal.truncate(0)
 
 
 def _read_shard(path: Path, wanted: pa.Schema) -> pa.Table:
@@ -223,26 +211,6 @@ def _read_shard(path: Path, wanted: pa.Schema) -> pa.Table:
     if table.schema.names != wanted.names:
         raise CampaignError(f"{path}: has other columns than this version writes; use the version in {MANIFEST}")
     return table.cast(wanted)
-
-
-def _read_journal(path: Path) -> list[Row]:
-    """Rows of the journal; a last line that was cut short is no row."""
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise CampaignError(f"{path}: cannot be read ({error.strerror})") from error
-    lines = text.split("\n")
-    rows: list[Row] = []
-    for number, line in enumerate(lines, start=1):
-        try:
-            rows.append(json.loads(line))
-        except ValueError as error:
-            if any(later.strip() for later in lines[number:]):
-                remedy = "delete that line, --resume runs its episode again"
-                raise CampaignError(f"{path}: line {number} is damaged; {remedy}") from error
-    return rows
 
 
 def _without(rows: Iterable[Row], episodes: set[int]) -> list[Row]:
@@ -275,17 +243,3 @@ def _sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-@contextmanager
-def _readable(folder: Path) -> Generator[None]:
-    """Errors of the file system in one line; what was written stays as it was."""
-    try:
-        yield
-    except OSError as error:
-        why = error.strerror or str(error)
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        remedy = "make room" if full else "make it writable or give another --out"
-        raise CampaignError(
-            f"{folder}: cannot be written ({why}); {remedy}; --resume goes on, finished episodes are kept"
-        ) from error

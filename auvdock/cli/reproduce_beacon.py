@@ -16,6 +16,7 @@ from rich.table import Table
 
 from auvdock.cli.parsing import parse
 from auvdock.core.errors import ConfigError
+from auvdock.experiments.kept import Kept
 from auvdock.experiments.rotating_rig import X_M, Y_M
 from auvdock.experiments.rotating_tables import (
     PAPER_AZIMUTH_DEG,
@@ -58,7 +59,8 @@ class Azimuth:
     workers: int = 1
     """Processes."""
     out: Path | None = None
-    """Folder for a plot and every video's errors."""
+    """Folder for a plot, every video's errors, and watches.jsonl, from which a run that was stopped goes on and which
+    both tables read: the second needs no video of its own."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -121,16 +123,16 @@ def _run(args: Azimuth, kind: _Kind) -> int:
     count = len(PLACES) * args.videos + (len(SCENARIOS) * scenario_videos if with_scenarios else 0)
     columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     scenarios: list[ScenarioRow] = []
+    kept = Kept(None if args.out is None else args.out / "watches.jsonl")
     with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("videos", total=count)
-        watches = run_videos(
-            PLACES, args.videos, args.turns, args.fidelity, args.workers, lambda: progress.advance(task)
-        )
+        shared = (args.turns, args.fidelity, args.workers, lambda: progress.advance(task))
+        watches = run_videos(PLACES, args.videos, *shared, kept=kept)
         if with_scenarios:
-            scenarios = scenario_rows(
-                scenario_videos, args.turns, args.fidelity, args.workers, lambda: progress.advance(task)
-            )
+            scenarios = scenario_rows(scenario_videos, *shared, kept=kept)
+    kept.close()
     report = _report(args, kind, watches, scenarios)
+    report["git_revisions"] = sorted(str(revision) for revision in kept.revisions)
     if args.out is not None:
         picture = args.out / f"{kind.name}.png"
         draw_errors(picture, kind.title, kind.paper, watches, kind.ours, kind.paper_method)

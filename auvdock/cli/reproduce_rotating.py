@@ -16,6 +16,7 @@ from rich.table import Table
 from auvdock.campaign.statistics import McNemar, Rate
 from auvdock.cli.parsing import parse
 from auvdock.core.errors import ConfigError
+from auvdock.experiments.kept import Kept
 from auvdock.experiments.rotating_docking import (
     ARMS,
     ArmSummary,
@@ -52,7 +53,8 @@ class RotatingDocking:
     workers: int = 1
     """Processes."""
     out: Path | None = None
-    """Folder for rotating_docking.png, the tracks from above, and rotating_docking.json, every episode."""
+    """Folder for rotating_docking.png, the tracks from above, rotating_docking.json, every episode, and flights.jsonl,
+    from which a run that was stopped goes on."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -70,6 +72,7 @@ def run_rotating_docking(argv: Sequence[str], prog: str) -> int:
     cv2.setNumThreads(1)
     seeds = range(args.first_seed, args.first_seed + args.episodes)
     flown: dict[str, tuple[Flight, ...]] = {}
+    kept = Kept(None if args.out is None else args.out / "flights.jsonl")
     columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
         for arm in arms:
@@ -80,9 +83,11 @@ def run_rotating_docking(argv: Sequence[str], prog: str) -> int:
                 args.fidelity,
                 args.workers,
                 lambda: progress.advance(task),  # noqa: B023 - called within this turn of the loop only
+                kept,
             )
             if args.out is not None:
                 _store(args.out, flown)
+    kept.close()
     summaries = [summarise(arm, flown[arm.name]) for arm in arms]
     tests = {}
     if "beacon" in flown:
@@ -92,7 +97,7 @@ def run_rotating_docking(argv: Sequence[str], prog: str) -> int:
         draw_tracks(args.out / "rotating_docking.png", panels or [(arms[0], flown[arms[0].name])])
     met = {s.arm.name: (s.docked.rate or 0.0) >= TARGETS[s.arm.name] for s in summaries if s.arm.name in TARGETS}
     if args.json:
-        print(json.dumps(_plain(args, summaries, tests, met), allow_nan=False))
+        print(json.dumps(_plain(args, summaries, tests, met, kept), allow_nan=False))
     else:
         _print(summaries, tests)
     return 0 if all(met.values()) else 1
@@ -104,13 +109,17 @@ def _store(folder: Path, flown: dict[str, tuple[Flight, ...]]) -> None:
         rows[name] = []
         for flight in flights:
             row = flight.result.to_json()
-            del row["config"], row["versions"]
+            del row["config"], row["versions"]  # of all the same; flights.jsonl has the versions
             rows[name].append(row)
     (folder / "rotating_docking.json").write_text(json.dumps(rows, allow_nan=False), encoding="utf-8")
 
 
 def _plain(
-    args: RotatingDocking, summaries: Sequence[ArmSummary], tests: dict[str, McNemar], met: dict[str, bool]
+    args: RotatingDocking,
+    summaries: Sequence[ArmSummary],
+    tests: dict[str, McNemar],
+    met: dict[str, bool],
+    kept: Kept,
 ) -> dict[str, Any]:
     arms: list[dict[str, Any]] = []
     for summary in summaries:
@@ -122,6 +131,7 @@ def _plain(
         "first_seed": args.first_seed,
         "episodes": args.episodes,
         "fidelity": args.fidelity,
+        "git_revisions": sorted(str(revision) for revision in kept.revisions),
         "targets": TARGETS,
         "met": met,
         "arms": arms,

@@ -96,7 +96,7 @@ def test_command_refuses_what_cannot_be():
 
 
 def test_command_reports_and_stores_what_was_flown(tmp_path, capsys, monkeypatch):
-    def flown(arm, seeds, fidelity, workers, done):
+    def flown(arm, seeds, fidelity, workers, done, kept):
         assert (fidelity, workers) == ("beacons", 1)
         return tuple(flight(seed, arm.name == "beacon" or seed % 2 == 0, 50.0 * seed) for seed in seeds)
 
