@@ -122,7 +122,7 @@ class LandingEnv(VehicleEnv):
         perception = perception or LandingPerceptionCfg()
         self._world = LandingWorld(self.cfg, perception.detector, perception.tag_detector)
         self._detector = make_detector(perception.detector)
-        self._tag_detector = make_tag_detector(perception.tag_detector)
+        self._tag_detector = make_tag_detector(perception.tag_detector, (self.cfg.station.tag.tag_id,))
         self._perception = LandingPerception(perception, self._world.camera, self.cfg.station)
         self._percept: LandingPercept | None = None
         self._seat = np.append(self._world.simulator.vehicle.seat_body_m, 1.0)

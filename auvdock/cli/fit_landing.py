@@ -54,7 +54,8 @@ class FitLanding:
 def run(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(FitLanding, argv, prog)
-    detector, tag_detector = make_detector(args.detector), make_tag_detector(args.tag_detector)
+    detector = make_detector(args.detector)
+    tag_detector = make_tag_detector(args.tag_detector, (LandingWorldCfg().station.tag.tag_id,))
     rng = np.random.default_rng(args.seed)
     lights: list[Observation] = []
     tags: list[TagObservation] = []

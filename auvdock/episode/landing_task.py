@@ -44,7 +44,7 @@ class LandingTask:
         self.station = cfg.world.station
         self.detector = cfg.perception.detector
         self._detector = make_detector(self.detector)
-        self._tag_detector = make_tag_detector(cfg.perception.tag_detector)
+        self._tag_detector = make_tag_detector(cfg.perception.tag_detector, (self.station.tag.tag_id,))
         self.world = LandingWorld(cfg.world, self.detector, cfg.perception.tag_detector)
         vehicle, camera = self.world.simulator.vehicle, self.world.camera
         self._perception = LandingPerception(cfg.perception, camera, self.station)

@@ -66,6 +66,16 @@ def test_other_numbers_are_read(name: str, tag_id: int):
 
 
 @pytest.mark.parametrize("name", TAG_DETECTORS)
+def test_looks_for_wanted_numbers_only(name: str):
+    frame = tag_frame(pose(1.0), np.random.default_rng(2), tag_id=41)
+    (tag,) = make_tag_detector(name, (7, 41)).detect(frame)
+    (same,) = make_tag_detector(name).detect(frame)
+    assert tag.tag_id == same.tag_id == 41
+    np.testing.assert_array_equal(tag.corners_px, same.corners_px)
+    assert make_tag_detector(name, (7,)).detect(frame) == ()
+
+
+@pytest.mark.parametrize("name", TAG_DETECTORS)
 def test_nothing_in_nothing(name: str):
     """Black, white and noise hold no tag."""
     noise = np.random.default_rng(3).integers(0, 255, (600, 800, 3)).astype(np.uint8)

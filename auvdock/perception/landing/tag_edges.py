@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, Image
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Frame
 
@@ -40,13 +42,13 @@ def refined_corners(frame: Frame, corners_px: Array) -> tuple[Array, float] | No
         corners_px: (4, 2) rough corners, clockwise in the image.
     """
     camera = frame.camera
-    light, origin = _light_around(frame, corners_px)
+    patch = _patch_around(frame, corners_px)
     corners, variance = corners_px, 0.0
     for _ in range(_PASSES):
         lines: list[tuple[Array, Array]] = []
         variance = 0.0
         for side in range(4):
-            points = _edge_points(light, origin, corners[side], corners[(side + 1) % 4])
+            points = _edge_points(patch, corners[side], corners[(side + 1) % 4])
             if points is None:
                 return None
             fitted = line_through(camera.normalise(points))
@@ -93,52 +95,96 @@ def line_through(points: Array) -> tuple[Array, Array, float, int] | None:
         across = (points - centre) @ axes[1]
         if last:
             return centre, direction, math.sqrt(float(across @ across) / (len(points) - 2)), len(points)
-        spread = 1.4826 * float(np.median(np.abs(across)))
-        points = points[np.abs(across) <= 3.0 * spread + 1e-12]
+        away = np.abs(across)
+        points = points[away <= 3.0 * 1.4826 * _median(away) + 1e-12]
     return None
 
 
-def _light_around(frame: Frame, corners_px: Array) -> tuple[NDArray[np.float32], Array]:
-    """(linear light (h, w) of the brightest channel around the corners, (2,) the patch's first column and row)."""
+class _Patch(NamedTuple):
+    """The part of an image around a tag.
+
+    Attributes:
+        codes: (h, w) view of the brightest channel.
+        origin: (2,) the patch's first column and row.
+        light: (256,) linear light of each code.
+    """
+
+    codes: Image
+    origin: Array
+    light: NDArray[np.float32]
+
+
+def _patch_around(frame: Frame, corners_px: Array) -> _Patch:
+    """The patch around the corners."""
     height, width = frame.image.shape[:2]
     x0, y0 = np.maximum(np.floor(corners_px.min(axis=0)).astype(int) - _AROUND_PX, 0).tolist()
     x1, y1 = (np.ceil(corners_px.max(axis=0)).astype(int) + _AROUND_PX + 1).tolist()
     patch = frame.image[y0 : min(y1, height), x0 : min(x1, width)]
     channel = int(np.argmax(patch[::8, ::8].reshape(-1, 3).sum(axis=0, dtype=np.int64)))
-    codes = np.ascontiguousarray(patch[:, :, channel])
-    light = cv2.LUT(codes, frame.response.electrons(frame.gain).astype(np.float32))
-    return np.asarray(light, dtype=np.float32), np.array([float(x0), float(y0)])
+    light = frame.response.electrons(frame.gain).astype(np.float32)
+    return _Patch(patch[:, :, channel], np.array([float(x0), float(y0)]), light)
 
 
-def _edge_points(light: NDArray[np.float32], origin: Array, start: Array, end: Array) -> Array | None:
+def _edge_points(patch: _Patch, start: Array, end: Array) -> Array | None:
     """(n, 2) sub-pixel points of the edge from black to white along one side; None where there is none."""
     side = end - start
-    length = float(np.linalg.norm(side))
+    length = math.sqrt(float(side @ side))
     if length < 8.0:
         return None
     along = side / length
     # Clockwise in an image whose y points down: outwards is to the left of the way.
     outward = np.array([along[1], -along[0]])
     reach = min(max(0.7 * length / _CELLS, 1.5), 8.0)
-    count = int(min(max(length / 1.5, 8.0), 60.0))
-    base = start + np.linspace(_FROM, _TO, count)[:, None] * side
+    base = start + _places(int(min(max(length / 1.5, 8.0), 60.0))) * side
     offset = np.arange(-reach, reach + 0.5 * _STEP_PX, _STEP_PX)
-    where = base[:, None, :] + offset[:, None] * outward - origin
-    ends = where[[0, 0, -1, -1], [0, -1, 0, -1]]
-    if ends.min() < 0.0 or ends[:, 0].max() > light.shape[1] - 1 or ends[:, 1].max() > light.shape[0] - 1:
+    x, y = (base[:, k : k + 1] + offset * outward[k] - patch.origin[k] for k in range(2))
+    profile = _profiles(patch, x, y)
+    if profile is None:
         return None
-    at = where.astype(np.float32)
-    profile = cv2.remap(light, at[:, :, 0], at[:, :, 1], cv2.INTER_LINEAR)
-    slope = np.diff(np.asarray(profile, dtype=np.float64), axis=1)
+    slope = profile[:, 1:] - profile[:, :-1]
     middle = 0.5 * (offset[1:] + offset[:-1])
     # Against the noise: only what rises by a good part of the steepest rise belongs to the edge.
     steepest = slope.max(axis=1)
-    weight = np.clip(slope - 0.3 * steepest[:, None], 0.0, None)
+    weight = np.maximum(slope - 0.3 * steepest[:, None], 0.0)
     total = weight.sum(axis=1)
     good = (steepest > 0.0) & (total > 0.0)
-    typical = float(np.median(steepest))
-    good &= steepest > 0.3 * typical
-    if int(good.sum()) < 4:
+    good &= steepest > 0.3 * _median(steepest)
+    if not good.all():
+        if int(good.sum()) < 4:
+            return None
+        base, weight, total = base[good], weight[good], total[good]
+    shift = (weight @ middle) / total
+    return base + shift[:, None] * outward
+
+
+def _profiles(patch: _Patch, x: Array, y: Array) -> Array | None:
+    """(n, k) linear light at columns and rows (n, k) of a patch; None where the grid leaves the patch."""
+    # A grid that is a parallelogram has its extremes at its corners.
+    corners = ([0, 0, -1, -1], [0, -1, 0, -1])
+    across, down = x[corners], y[corners]
+    height, width = patch.codes.shape
+    left, top, right, bottom = float(across.min()), float(down.min()), float(across.max()), float(down.max())
+    if left < 0.0 or top < 0.0 or right > width - 1 or bottom > height - 1:
         return None
-    shift = (weight[good] @ middle) / total[good]
-    return base[good] + shift[:, None] * outward
+    # Only the part around this side is made linear. Whole pixels are taken off after rounding, which is exact.
+    x0, y0, x1, y1 = int(left), int(top), int(right) + 3, int(bottom) + 3
+    light = cv2.LUT(np.ascontiguousarray(patch.codes[y0:y1, x0:x1]), patch.light)
+    map_x, map_y = x.astype(np.float32), y.astype(np.float32)
+    map_x -= np.float32(x0)
+    map_y -= np.float32(y0)
+    return np.asarray(cv2.remap(light, map_x, map_y, cv2.INTER_LINEAR), dtype=np.float64)
+
+
+@lru_cache(maxsize=64)
+def _places(count: int) -> Array:
+    """(count, 1) places along a side, as shares of it; not to be changed."""
+    return np.linspace(_FROM, _TO, count)[:, None]
+
+
+def _median(values: Array) -> float:
+    """Median of (n,) finite values, without the care for all else that makes NumPy's slow."""
+    half = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, half)[half])
+    low, high = np.partition(values, (half - 1, half))[half - 1 : half + 1].tolist()
+    return 0.5 * (low + high)
