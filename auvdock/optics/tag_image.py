@@ -21,6 +21,9 @@ __all__ = ["TagImage"]
 
 _NO_MAP: NDArray[np.float32] = np.empty(0, dtype=np.float32)
 _PAD_PX = 5
+_STRIP_PX = 16384
+"""Pixels that are drawn at a time: few enough to stay in a processor's cache from one step to the next."""
+_SPARE_TEXELS = 4.0
 _TEXEL_PX = 0.8
 """Distance of the texture's texels in pixels."""
 _KNOTS = 7
@@ -77,20 +80,41 @@ class TagImage:
         x0, y0, x1, y1 = region
         back = np.asarray(np.linalg.inv(plane), dtype=np.float64)
         sigma_u, sigma_v, step = self._footprint(plane, back)
-        texture, first = self._pattern.texture(step, sigma_u, sigma_v)
+        first, count = self._pattern.texels(step, sigma_u, sigma_v)
+        to_texel = np.array([[1.0 / step, 0.0, -first / step], [0.0, 1.0 / step, -first / step], [0.0, 0.0, 1.0]])
+        window = self._window(region, to_texel @ back, count)
+        texture = self._pattern.texture(step, sigma_u, sigma_v, window)
         if hidden:
             texture[:, :, 0] = texture[:, :, 1] * np.float32(_COVER)
-        to_texel = np.array([[1.0 / step, 0.0, -first / step], [0.0, 1.0 / step, -first / step], [0.0, 0.0, 1.0]])
-        tangents = self._lens_map()[y0:y1, x0:x1]
-        place = cv2.perspectiveTransform(tangents, to_texel @ back)
-        drawn = cv2.remap(texture, place, _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0.0)
         unit, veil = self._shading(region, back, T_world_camera, exposure_s)
-        share, cover = np.ascontiguousarray(drawn[:, :, 0]), np.ascontiguousarray(drawn[:, :, 1])
-        target = image[y0:y1, x0:x1]
-        if surfaces is not None:
-            veil -= self._enlarged(surfaces, region)
-        cv2.accumulateProduct(unit, cv2.merge([share, share, share]), target)
-        cv2.accumulateProduct(veil, cv2.merge([cover, cover, cover]), target)
+        under = self._enlarged(surfaces, region) if surfaces is not None else None
+        tangents, target = self._lens_map()[y0:y1, x0:x1], image[y0:y1, x0:x1]
+        rows = max(_STRIP_PX // (x1 - x0), 1)
+        for top in range(0, y1 - y0, rows):
+            strip = slice(top, min(top + rows, y1 - y0))
+            place = cv2.perspectiveTransform(tangents[strip], to_texel @ back)
+            drawn = _read(texture, np.asarray(place, dtype=np.float32), window)
+            cv2.accumulateProduct(unit[strip], _thrice(drawn, 0), target[strip])
+            beside = None if veil is None else veil[strip]
+            if under is not None:
+                beside = -under[strip] if beside is None else beside - under[strip]
+            if beside is not None:
+                cv2.accumulateProduct(beside, _thrice(drawn, 1), target[strip])
+
+    def _window(self, region: tuple[int, int, int, int], to_texel: Array, count: int) -> tuple[int, int, int, int]:
+        """Texels x0, y0, x1, y1 that a region shows: from a nearby tag's they are few."""
+        x0, y0, x1, y1 = region
+        tangents = self._lens_map()[y0:y1, x0:x1]
+        # Lens and plane keep inside and outside apart, so the region's rim shows the outermost texels.
+        rim = np.concatenate([tangents[0], tangents[-1], tangents[:, 0], tangents[:, -1]]).astype(np.float64)
+        place = np.column_stack([rim, np.ones(len(rim))]) @ to_texel.T
+        if not float(place[:, 2].min()) > 0.0:
+            # It reaches to the plane's horizon.
+            return 0, 0, count, count
+        place = place[:, :2] / place[:, 2:]
+        low = np.clip(place.min(axis=0) - _SPARE_TEXELS, 0.0, count - 2.0)
+        high = np.clip(place.max(axis=0) + _SPARE_TEXELS + 1.0, low + 2.0, float(count))
+        return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
     def _lens_map(self) -> NDArray[np.float32]:
         """(H, W, 2) tangents of the ray through each pixel."""
@@ -135,8 +159,11 @@ class TagImage:
 
     def _shading(
         self, region: tuple[int, int, int, int], back: Array, T_world_camera: Array, exposure_s: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Electrons per unit of reflectance and of the veil (h, w, 3), computed at a few points and enlarged."""
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Electrons per unit of reflectance and of the veil (h, w, 3), computed at a few points and enlarged.
+
+        The veil is None where there is none.
+        """
         x0, y0, x1, y1 = region
         scene = self.scene
         share = (np.arange(_KNOTS) + 0.5) / _KNOTS
@@ -152,7 +179,7 @@ class TagImage:
         lens = scene.lit.lens
         pixels = np.column_stack([np.tile(x, _KNOTS), np.repeat(y, _KNOTS)])
         solid = lens.solid_angle_at(pixels)[:, None] * exposure_s
-        return _enlarge(unit * solid, region), _enlarge(veil * solid, region)
+        return _enlarge(unit * solid, region), _enlarge(veil * solid, region) if veil.any() else None
 
     def _enlarged(self, coarse: NDArray[np.float32], region: tuple[int, int, int, int]) -> NDArray[np.float32]:
         """The region of a coarser image (h, w, 3) as `cv2.resize` would enlarge it."""
@@ -166,6 +193,23 @@ class TagImage:
         whole = cv2.resize(part, size, interpolation=cv2.INTER_LINEAR)
         whole = np.asarray(whole, dtype=np.float32)
         return whole[y0 - top * step : y1 - top * step, x0 - left * step : x1 - left * step]
+
+
+def _read(
+    texture: NDArray[np.float32], place: NDArray[np.float32], window: tuple[int, int, int, int]
+) -> NDArray[np.float32]:
+    """(h, w, 2) a window of a texture at places (h, w, 2) on the whole of it, which are changed."""
+    # Whole texels are taken off after rounding, which is exact; both coordinates at once, as a complex number.
+    shifted = place.view(np.complex64)
+    shifted -= np.complex64(complex(window[0], window[1]))
+    drawn = cv2.remap(texture, place, _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0.0)
+    return np.asarray(drawn, dtype=np.float32)
+
+
+def _thrice(values: NDArray[np.float32], channel: int) -> NDArray[np.float32]:
+    """(h, w, 3) one channel of an image (h, w, 2) for red, green and blue."""
+    grey = np.ascontiguousarray(values[:, :, channel])
+    return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), dtype=np.float32)
 
 
 def _enlarge(values: Array, region: tuple[int, int, int, int]) -> NDArray[np.float32]:

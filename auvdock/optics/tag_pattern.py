@@ -26,6 +26,7 @@ SQUARE_CELLS = 8
 BLACK_SHARE = 0.1
 """Reflectance of black over white."""
 _REACH_SIGMAS = 4.5
+_PIECE = 16384
 
 
 def tag_cells(tag_id: int) -> NDArray[np.bool_]:
@@ -72,22 +73,39 @@ class TagPattern:
         """Take the tag's cells."""
         self._cells = np.where(tag_cells(tag.tag_id), 1.0, BLACK_SHARE) * tag.reflectance
 
-    def texture(self, cells_per_texel: float, sigma_u: float, sigma_v: float) -> tuple[NDArray[np.float32], float]:
-        """Reflectance × coverage and coverage, (n, n, 2), and the cell coordinate of its first texel.
+    def texels(self, cells_per_texel: float, sigma_u: float, sigma_v: float) -> tuple[float, int]:
+        """Cell coordinate of the texture's first texel, and the number of texels along an edge."""
+        first = -_REACH_SIGMAS * max(sigma_u, sigma_v)
+        return first, math.ceil((CELLS - 2.0 * first) / cells_per_texel) + 1
+
+    def texture(
+        self,
+        cells_per_texel: float,
+        sigma_u: float,
+        sigma_v: float,
+        window: tuple[int, int, int, int] | None = None,
+    ) -> NDArray[np.float32]:
+        """Reflectance × coverage and coverage, (rows, columns, 2).
 
         Args:
             cells_per_texel: distance of texels, in cells.
             sigma_u: standard deviation of the blur along u, in cells.
             sigma_v: along v.
+            window: texels from (x0, y0) up to (x1, y1), all of them with None.
         """
-        first = -_REACH_SIGMAS * max(sigma_u, sigma_v)
-        count = math.ceil((CELLS - 2.0 * first) / cells_per_texel) + 1
+        first, count = self.texels(cells_per_texel, sigma_u, sigma_v)
+        x0, y0, x1, y1 = window if window is not None else (0, 0, count, count)
         place = np.asarray(first + cells_per_texel * np.arange(count), dtype=np.float64)
-        across, down = _shares(place, sigma_u), _shares(place, sigma_v)
-        texture = np.empty((count, count, 2), dtype=np.float32)
-        texture[:, :, 0] = down @ self._cells.astype(np.float32) @ across.T
-        texture[:, :, 1] = np.outer(down.sum(axis=1), across.sum(axis=1))
-        return texture, first
+        across, down = _shares(place[x0:x1], sigma_u), _shares(place[y0:y1], sigma_v)
+        texture = np.empty((len(down), len(across), 2), dtype=np.float32)
+        reflected = down @ self._cells.astype(np.float32)
+        covered, columns = down.sum(axis=1), across.sum(axis=1)
+        # In pieces too small for BLAS to call its threads, which stall where there are more workers than processors.
+        rows = max(_PIECE // len(across), 1)
+        for top in range(0, len(down), rows):
+            piece = slice(top, top + rows)
+            cv2.merge([reflected[piece] @ across.T, covered[piece, None] * columns], texture[piece])
+        return texture
 
 
 def _shares(place: Array, sigma: float) -> NDArray[np.float32]:

@@ -154,7 +154,7 @@ def test_cells_have_the_light_that_the_scene_says():
 
 def test_texture_covers_the_tag_and_nothing_else():
     pattern = TagPattern(STATION.tag)
-    texture, first = pattern.texture(0.05, 0.08, 0.08)
+    texture, (first, _) = pattern.texture(0.05, 0.08, 0.08), pattern.texels(0.05, 0.08, 0.08)
     area = float(texture[:, :, 1].sum()) * 0.05**2
     assert area == pytest.approx(CELLS**2, rel=1e-3)
     assert first < -0.3
