@@ -81,14 +81,16 @@ class CoreDetector:
         cfg = self._cfg
         half = cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
         small = _mean_channel(np.asarray(half, dtype=np.uint8))
-        base, peak = float(np.median(small[::2, ::2])), float(small.max())
+        base, peak = _median(small[::2, ::2], 0), float(small.max())
         sigma = noise_sigma(small)
         if peak - base < max(cfg.min_contrast, 8.0 * sigma):
             return Detections.empty()
         left, top, right, bottom = _bounds(small, base + cfg.levels[-1] * (peak - base))
         height, width = small.shape
         small = np.ascontiguousarray(small[top:bottom, left:right])
-        taken = np.zeros(small.shape, dtype=np.uint8)
+        # One pixel of each component that was taken: at a lower cut the rest of it is where that is.
+        columns: list[int] = []
+        rows: list[int] = []
         boxes: list[Array] = []
         centres: list[Array] = []
         peaks: list[float] = []
@@ -96,16 +98,17 @@ class CoreDetector:
             cut = base + share * (peak - base)
             _, mask = cv2.threshold(small, cut, 255, cv2.THRESH_BINARY)
             count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_16U)
-            old = set(np.unique(labels[taken > 0]).tolist())
+            old = set(np.asarray(labels)[rows, columns].tolist())
             for label in range(1, count):
                 x, y, w, h, area = stats[label].tolist()
                 if label in old or area < cfg.min_area_px:
                     continue
-                part = labels[y : y + h, x : x + w] == label
-                highest = float(small[y : y + h, x : x + w][part].max())
+                part = np.equal(labels[y : y + h, x : x + w], label).view(np.uint8)
+                _, highest, _, (column, row) = cv2.minMaxLoc(small[y : y + h, x : x + w], part)
                 if share < cfg.levels[0] and highest - cut < cfg.prominence * (peak - base):
                     continue
-                taken[y : y + h, x : x + w][part] = 1
+                columns.append(x + column)
+                rows.append(y + row)
                 x, y = x + left, y + top
                 cut_off = x == 0 or y == 0 or x + w == width or y + h == height
                 if cut_off or max(w, h) > cfg.max_aspect * min(w, h) + 2.0:
@@ -146,6 +149,15 @@ def _centre(image: Image, box: IntArray, cut: float) -> Array:
     return np.array([x0 + column, y0 + row])
 
 
+def _median(image: Image, channel: int) -> float:
+    """Median of one channel of an image of 8 bits, from its histogram."""
+    counts = cv2.calcHist([image], [channel], None, [256], [0.0, 256.0]).ravel()
+    total = np.cumsum(counts)
+    size = image.shape[0] * image.shape[1]
+    low, high = np.searchsorted(total, [(size + 1) // 2, size // 2 + 1]).tolist()
+    return 0.5 * (low + high)
+
+
 def _class(patch: Image, ground: Array) -> int:
     """Whether there is more red or more blue in a patch than in the image as a whole."""
     red, _, blue, _ = cv2.mean(patch)
@@ -160,7 +172,8 @@ def _detections(image: Image, boxes: list[Array], centres: list[Array], snr: Arr
     # A core is white; the colour is in the halo around it.
     rim = (xyxy[:, 2:] - xyxy[:, :2]).max(axis=1, keepdims=True) + _HALO_PX
     around = np.maximum(np.hstack([xyxy[:, :2] - rim, xyxy[:, 2:] + rim]).round().astype(int), 0)
-    ground = np.median(image[::8, ::8].reshape(-1, 3), axis=0).astype(np.float64)
+    loose = image[::8, ::8]
+    ground = np.array([_median(loose, channel) for channel in range(3)])
     classes = np.array([_class(image[y0:y1, x0:x1], ground) for x0, y0, x1, y1 in around.tolist()], dtype=np.int64)
     strength = snr[order]
     return Detections(xyxy, np.array(centres)[order], strength / (strength + _SCORE_HALF_SNR), classes)
