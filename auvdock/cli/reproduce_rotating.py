@@ -141,25 +141,35 @@ def _plain(
 
 def _print(summaries: Sequence[ArmSummary], tests: dict[str, McNemar]) -> None:
     console = Console()
-    table = Table(title="docking by the rotating beacon; 95 % intervals after Wilson", title_justify="left")
-    for name in ("arm", "docked", "began in front", "began behind", "found", "first pose", "docked after"):
-        table.add_column(name, justify="left" if name == "arm" else "right")
-    for name in ("azimuth rms", "median of episodes", "at hand-over", "failures"):
-        table.add_column(name, justify="left" if name == "failures" else "right")
+    # Two narrow tables: one of all columns is not legible in a terminal of 80.
+    table = _table("docked; 95 % intervals after Wilson", ("arm", "of all", "began in front", "began behind"))
+    for s in summaries:
+        table.add_row(s.arm.title, _share(s.docked), _share(s.front), _share(s.behind))
+    console.print(table)
+    columns = ("arm", "found", "pose", "docked", "azimuth rms", "median", "hand-over")
+    table = _table("median times; azimuth errors: all fixes, median episode, as the array took over", columns)
     for s in summaries:
         seconds = [_shown(value, "{:.0f} s") for value in (s.acquire_s, s.first_pose_s, s.time_s)]
         angles = [_shown(value, "{:.2f}°") for value in (s.azimuth_rms_deg, s.azimuth_median_deg, s.handover_deg)]
-        causes = ", ".join(f"{name} {count}" for name, count in sorted(s.failures.items()))
-        table.add_row(
-            s.arm.title, _share(s.docked), _share(s.front), _share(s.behind), *seconds, *angles, causes or "-"
-        )
+        table.add_row(s.arm.title, *seconds, *angles)
     console.print(table)
+    for s in summaries:
+        if s.failures:
+            causes = ", ".join(f"{name} {count}" for name, count in sorted(s.failures.items()))
+            console.print(f"{s.arm.title}: failed in {causes}", highlight=False)
     for name, test in tests.items():
         console.print(
             f"{name} against beacon, {test.pairs} pairs: difference {100 * test.difference:+.1f} "
             f"[{100 * test.low:+.1f}, {100 * test.high:+.1f}] points, McNemar p = {test.p_value:.2g}",
             highlight=False,
         )
+
+
+def _table(title: str, columns: Sequence[str]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for name in columns:
+        table.add_column(name, justify="left" if name == "arm" else "right")
+    return table
 
 
 def _share(rate: Rate) -> str:
