@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.journal import Journal, read_journal
 from auvdock.campaign.provenance import git_revision
 from auvdock.core.strict import from_mapping, to_plain
@@ -36,7 +37,11 @@ class Kept:
         self.revisions: set[str | None] = set()
         """Git revisions of the pieces that were found or added."""
         if path is not None:
-            for row in read_journal(path):
+            for number, row in enumerate(read_journal(path), start=1):
+                if not {"key", "value", "revision"} <= set(row):
+                    raise CampaignError(
+                        f"{path}: line {number} holds no finished piece; delete it"
+                    )
                 self._pieces[_text(row["key"])] = row["value"], row["revision"]
         self._journal = Journal(path) if path is not None else None
 

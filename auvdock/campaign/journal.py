@@ -70,7 +70,7 @@ def read_journal(path: Path) -> list[dict[str, Any]]:
             rows.append(json.loads(line))
         except ValueError as error:
             if any(later.strip() for later in lines[number:]):
-                remedy = "delete that line and start again where it stopped: what the line held is run again"
+                remedy = "delete that line; started again (sweep: with --resume) it runs what the line held"
                 raise CampaignError(f"{path}: line {number} is damaged; {remedy}") from error
     return rows
 
@@ -85,5 +85,6 @@ def readable_errors(folder: Path) -> Generator[None]:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
         remedy = "make room" if full else "make it writable or give another --out"
         raise CampaignError(
-            f"{folder}: cannot be written ({why}); {remedy}; --resume goes on, finished episodes are kept"
+            f"{folder}: cannot be written ({why}); {remedy}; started again (sweep: with --resume) it goes on, what was "
+            "finished is kept"
         ) from error

@@ -104,6 +104,9 @@ def test_a_torn_line_is_run_again_and_a_damaged_one_named(tmp_path):
     path.write_text(text.replace('"seed": 1', '"seed', 1), encoding="utf-8")
     with pytest.raises(CampaignError, match="line 2"):
         Kept(path)
+    path.write_text('{"episode": 3}\n', encoding="utf-8")
+    with pytest.raises(CampaignError, match="line 1 holds no finished piece"):
+        Kept(path)
 
 
 def test_other_versions_are_not_found_but_other_revisions_are_told(tmp_path):

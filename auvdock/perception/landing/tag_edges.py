@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -135,7 +134,7 @@ def _edge_points(patch: _Patch, start: Array, end: Array) -> Array | None:
     # Clockwise in an image whose y points down: outwards is to the left of the way.
     outward = np.array([along[1], -along[0]])
     reach = min(max(0.7 * length / _CELLS, 1.5), 8.0)
-    base = start + _places(int(min(max(length / 1.5, 8.0), 60.0))) * side
+    base = start + np.linspace(_FROM, _TO, int(min(max(length / 1.5, 8.0), 60.0)))[:, None] * side
     offset = np.arange(-reach, reach + 0.5 * _STEP_PX, _STEP_PX)
     x, y = (base[:, k : k + 1] + offset * outward[k] - patch.origin[k] for k in range(2))
     profile = _profiles(patch, x, y)
@@ -173,12 +172,6 @@ def _profiles(patch: _Patch, x: Array, y: Array) -> Array | None:
     map_x -= np.float32(x0)
     map_y -= np.float32(y0)
     return np.asarray(cv2.remap(light, map_x, map_y, cv2.INTER_LINEAR), dtype=np.float64)
-
-
-@lru_cache(maxsize=64)
-def _places(count: int) -> Array:
-    """(count, 1) places along a side, as shares of it; not to be changed."""
-    return np.linspace(_FROM, _TO, count)[:, None]
 
 
 def _median(values: Array) -> float:
