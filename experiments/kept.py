@@ -39,9 +39,7 @@ class Kept:
         if path is not None:
             for number, row in enumerate(read_journal(path), start=1):
                 if not {"key", "value", "revision"} <= set(row):
-                    raise CampaignError(
-                        f"{path}: line {number} holds no finished piece; delete it"
-                    )
+                    raise CampaignError(f"{path}: line {number} holds no finished piece; delete it")
                 self._pieces[_text(row["key"])] = row["value"], row["revision"]
         self._journal = Journal(path) if path is not None else None
 
