@@ -19,11 +19,13 @@ class StoredEpisode:
     """An episode of a campaign.
 
     Attributes:
+        station: that it docks into, a key of `auvdock.campaign.config.STATIONS`.
         spec: number, seed and place on the axes.
         cfg: its configuration.
         row: what the store holds of it; None if it has not been run.
     """
 
+    station: str
     spec: EpisodeSpec
     cfg: AnyEpisodeCfg
     row: Row | None
@@ -42,4 +44,4 @@ def stored_episode(reference: str) -> StoredEpisode:
     plan = Plan(read_campaign(Path(folder)))
     spec = plan[int(number)]
     rows = [row for row in read_table(Path(folder)).to_pylist() if row["episode"] == spec.episode]
-    return StoredEpisode(spec, plan.config(spec), rows[0] if rows else None)
+    return StoredEpisode(plan.cfg.station, spec, plan.config(spec), rows[0] if rows else None)

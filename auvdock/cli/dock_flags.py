@@ -1,30 +1,26 @@
-"""What the docking commands share: their flags, flying the episode, and showing its result."""
+"""Flags that all docking commands share."""
 
 from __future__ import annotations
 
-import json
 import math
 import sys
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-import cv2
+import tyro
 
-from auvdock.cli.display import ProgressDisplay, print_result
 from auvdock.core.errors import ConfigError, GraphicsError
-from auvdock.episode.result import EpisodeResult
-from auvdock.episode.runner import EpisodeRunner
-from auvdock.episode.trace import EpisodeObserver
+from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.optics.gl import probe_gl
 
-__all__ = ["DockFlags", "fly"]
+__all__ = ["DockFlags"]
 
 
 @dataclass(frozen=True)
-class DockFlags:
-    """Flags of every docking command."""
+class DockFlags(ABC):
+    """Flags of every docking command; each adds its station's own, and the field `episode` that they change."""
 
     seed: int = 0
     """Decides start, current, sensor noise and camera noise."""
@@ -33,8 +29,6 @@ class DockFlags:
     where OpenGL works, else beacons."""
     detector: str | None = None
     """threshold, blob, cores, or your own as package.module:Name."""
-    controller: str | None = None
-    """A pilot of your own as package.module:Name, in place of the station's."""
     controller: str | None = None
     """A pilot of your own as package.module:Name, in place of the station's."""
     water: str | None = None
@@ -53,6 +47,16 @@ class DockFlags:
     """Write a Rerun recording here."""
     json: bool = False
     """Print the result as one JSON object and nothing else."""
+    from_: Annotated[str | None, tyro.conf.arg(name="from", metavar="DIR#EPISODE")] = None
+    """Fly an episode of a campaign again, bit for bit; other flags then change single things of it."""
+
+    @abstractmethod
+    def resolve(self) -> AnyEpisodeCfg:
+        """The configuration with all flags applied.
+
+        Raises:
+            ConfigError: a value that does not fit.
+        """
 
     def changes(self) -> dict[str, Any]:
         """What the common flags change of the configuration.
@@ -81,43 +85,7 @@ class DockFlags:
             changes["perception"] = {"detector": self.detector}
         if self.controller is not None:
             changes["control"] = {"controller": self.controller}
-        if self.controller is not None:
-            changes["control"] = {"controller": self.controller}
         return changes
-
-
-def fly(
-    runner: EpisodeRunner, flags: DockFlags, title: str, check: Callable[[EpisodeResult], None] | None = None
-) -> int:
-    """Fly one episode as the flags say and show how it went.
-
-    Args:
-        runner: flies it.
-        flags: the command's flags.
-        title: of the result's table.
-        check: told of the result before it is shown.
-
-    Returns:
-        The exit code.
-    """
-    if flags.seed < 0:
-        raise ConfigError("seed", flags.seed, "a whole number of 0 or more")
-    cv2.setNumThreads(1)  # frames this small gain nothing from OpenCV's threads and stall on a busy machine
-    observers: list[EpisodeObserver] = []
-    if flags.record is not None:
-        from auvdock.recording.rerun_recorder import RerunRecorder
-
-        observers.append(RerunRecorder(flags.record))
-    if not flags.json:
-        observers.append(ProgressDisplay())
-    result = runner.run(flags.seed, observers)
-    if check is not None:
-        check(result)
-    if flags.json:
-        print(json.dumps(result.to_json(), allow_nan=False))
-    else:
-        print_result(result, flags.record, title)
-    return 0 if result.success else 1
 
 
 def _working_fidelity() -> str:

@@ -8,10 +8,9 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from auvdock.cli.dock_flags import DockFlags, fly
-from auvdock.cli.parsing import landing_base_config, parse
+from auvdock.cli.dock_flags import DockFlags
+from auvdock.cli.dock_run import run_dock
 from auvdock.episode.config import LandingEpisodeCfg
-from auvdock.episode.runner import EpisodeRunner
 
 __all__ = ["DockLanding", "run_landing"]
 
@@ -47,7 +46,4 @@ class DockLanding(DockFlags):
 
 def run_landing(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
-    asked_help = bool({"-h", "--help"} & set(argv))
-    default = DockLanding() if asked_help else DockLanding(episode=landing_base_config(argv))
-    args = parse(DockLanding, argv, prog, default)
-    return fly(EpisodeRunner(args.resolve()), args, "landing")
+    return run_dock(DockLanding, argv, prog, "landing", "landing")

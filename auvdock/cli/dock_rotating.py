@@ -9,7 +9,8 @@ from typing import Annotated, Any
 
 import tyro
 
-from auvdock.cli.dock import DockConical, run_dock
+from auvdock.cli.dock import DockConical
+from auvdock.cli.dock_run import run_dock
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import to_plain
 from auvdock.envs.config import rotating_world_cfg
@@ -58,4 +59,4 @@ class DockRotating(DockConical):
 
 def run_rotating(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
-    return run_dock(DockRotating, argv, prog, "rotating")
+    return run_dock(DockRotating, argv, prog, "rotating", "docking by the rotating beacon")

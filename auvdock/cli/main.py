@@ -15,6 +15,7 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
     ("dock", "conical"): ("auvdock.cli.dock:run_conical", "dock into the conical station, one episode"),
     ("dock", "rotating"): ("auvdock.cli.dock_rotating:run_rotating", "dock by the rotating beacon, from any side"),
     ("dock", "landing"): ("auvdock.cli.dock_landing:run_landing", "land on the platform, one episode"),
+    ("dock",): ("auvdock.cli.dock_from:run_from", "--from DIR#EPISODE: an episode of a campaign again"),
     ("sweep",): ("auvdock.cli.sweep:run", "run many episodes over currents, turbidity and more"),
     ("report",): ("auvdock.cli.report:run", "turn a campaign into one HTML page and tables for a paper"),
     ("view",): ("auvdock.cli.view:run", "open a recording in the Rerun viewer"),

@@ -9,11 +9,12 @@ from typing import TypeVar
 
 import tyro
 
+from auvdock.campaign.config import STATIONS
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import read_toml
-from auvdock.episode.config import EpisodeCfg, LandingEpisodeCfg, landing_level_cfg, level_cfg
+from auvdock.episode.config import AnyEpisodeCfg
 
-__all__ = ["DEFAULT_LEVEL", "base_config", "landing_base_config", "level_and_file", "parse"]
+__all__ = ["DEFAULT_LEVEL", "base_config", "level_and_file", "parse"]
 
 T = TypeVar("T")
 
@@ -31,25 +32,18 @@ def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None
     return tyro.cli(cls, args=list(argv), prog=prog, description=doc, default=default, config=config)
 
 
-def base_config(argv: Sequence[str], station: str = "conical") -> EpisodeCfg:
+def base_config(argv: Sequence[str], station: str) -> AnyEpisodeCfg:
     """The configuration that `--level N` and `--config FILE` ask for; other flags then change single fields of it.
 
-    Raises:
-        ConfigError: no such level, or a file that does not fit.
-    """
-    level, file = level_and_file(argv)
-    cfg = level_cfg(level, station)
-    return cfg.override(read_toml(file)) if file is not None else cfg
-
-
-def landing_base_config(argv: Sequence[str]) -> LandingEpisodeCfg:
-    """As `base_config`, for landing.
+    Args:
+        argv: what the user gave.
+        station: key of `auvdock.campaign.config.STATIONS`.
 
     Raises:
         ConfigError: no such level, or a file that does not fit.
     """
     level, file = level_and_file(argv)
-    cfg = landing_level_cfg(level)
+    cfg = STATIONS[station](level)
     return cfg.override(read_toml(file)) if file is not None else cfg
 
 

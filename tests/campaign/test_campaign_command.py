@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -9,6 +10,8 @@ import time
 
 import pytest
 
+from auvdock.campaign.config import STATIONS
+from auvdock.campaign.report.page import recording_path, replay_command
 from auvdock.campaign.store import read_table
 from auvdock.cli.main import main
 
@@ -71,6 +74,32 @@ def test_killed_and_resumed_the_table_is_that_of_an_undisturbed_run(tmp_path):
     assert done.returncode == 0, done.stderr
     assert read_table(out).equals(whole)
     assert read_table(out).to_pylist()[kept[0]["episode"]] == kept[0]
+
+
+@pytest.mark.parametrize("station", STATIONS)
+def test_an_episode_of_any_station_is_flown_again_and_recorded(station, tmp_path, capsys):
+    """The command that the report gives for a failure, as it stands there."""
+    out = tmp_path / "out"
+    flags = ["--station", station, "--fidelity", "beacons", "--episodes", "2", "--world.limits.max-time-s", "2"]
+    assert main(["sweep", *flags, "--out", str(out), "--executor", "serial", "--json"]) == 0
+    program, *words = shlex.split(replay_command(out, 1))
+    assert program == "auvdock"
+    assert main([*words, "--json"]) == 1
+    assert "episode 1 equals the campaign's, bit for bit" in capsys.readouterr().err
+    assert recording_path(out, 1).stat().st_size > 0
+
+    other = "landing" if station != "landing" else "rotating"
+    assert main(["dock", other, "--from", f"{out}#1", "--json"]) == 2
+    assert f"auvdock dock {station}" in capsys.readouterr().err
+    assert main(["report", str(out)]) == 0
+    assert recording_path(out, 1).name in (out / "report.html").read_text()
+
+
+def test_dock_alone_tells_what_it_wants(capsys):
+    assert main(["dock"]) == 2
+    assert "--from DIR#EPISODE" in capsys.readouterr().err
+    assert main(["dock", "--help"]) == 0
+    assert "landing" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

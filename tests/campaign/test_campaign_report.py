@@ -3,6 +3,7 @@
 import csv
 import io
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -15,10 +16,12 @@ from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.executor import SerialExecutor
 from auvdock.campaign.report.cells import load, success_map
 from auvdock.campaign.report.compare import compare
+from auvdock.campaign.report.figures import cause_figure, distribution_figure
 from auvdock.campaign.report.page import html_page, recording_path
 from auvdock.campaign.report.tables import csv_table, latex_table
 from auvdock.campaign.statistics import wilson
 from auvdock.cli.main import main
+from auvdock.episode.result import FAILURE_REASONS
 
 GRID = (AxisCfg("current", low=0.0, high=0.5, count=3), AxisCfg("attenuation", low=0.2, high=1.2, count=2))
 
@@ -80,6 +83,24 @@ def test_the_page_tells_rate_interval_and_every_failure(campaign):
 
 def test_the_same_rows_give_the_same_page(campaign):
     assert html_page(campaign, None) == html_page(load(campaign.folder), None)
+
+
+def test_every_cause_of_failure_can_be_drawn(campaign):
+    failed = [row for row in campaign.rows if row["success"] is False]
+    assert len(failed) >= len(FAILURE_REASONS)
+    rows = [{**row, "failure_reason": cause} for row, cause in zip(failed, FAILURE_REASONS, strict=False)]
+    drawn = cause_figure(replace(campaign, rows=rows))
+    assert all(f">{cause}<" in drawn for cause in FAILURE_REASONS)
+
+
+def test_only_what_the_station_has_is_drawn(campaign):
+    landing = ("touchdown_speed_m_s", "final_position_error_m", "final_heading_error_rad")
+    bare = [{**row, **dict.fromkeys(landing)} for row in campaign.rows]
+    assert "touchdown" not in distribution_figure(bare)
+    drawn = distribution_figure([{**row, "touchdown_speed_m_s": 0.05, "final_position_error_m": 0.002} for row in bare])
+    assert "touchdown speed" in drawn
+    assert "final position error" in drawn
+    assert "final heading error" not in drawn
 
 
 def test_a_recording_that_is_there_is_linked(campaign):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,6 +23,9 @@ INK, MUTED, GRID = "#1b2a38", "#5b6b7a", "#d5dde4"
 DOCKED, FAILED = "#2a7ab8", "#d9822b"
 CAUSES = {
     "search": "#3b4cc0",
+    "approach": "#2f7f86",
+    "circle": "#4fa59a",
+    "lineup": "#86c5a4",
     "far": "#5f8fd8",
     "mid": "#8fc1de",
     "near": "#f2b872",
@@ -41,8 +45,11 @@ DISTRIBUTIONS = (
     ("time_s", "time, s", 1.0),
     ("energy_j", "energy, kJ", 1e-3),
     ("peak_contact_force_n", "peak contact force, N", 1.0),
+    ("touchdown_speed_m_s", "touchdown speed, cm/s", 100.0),
+    ("final_position_error_m", "final position error, mm", 1000.0),
+    ("final_heading_error_rad", "final heading error, °", 180.0 / math.pi),
 )
-"""Columns, their labels and the factor to the label's unit."""
+"""Columns, their labels and the factor to the label's unit; those of which a station has nothing are left out."""
 
 
 _styled = rc_context(
@@ -152,9 +159,11 @@ def cause_figure(campaign: Campaign) -> str:
 @_styled
 def distribution_figure(rows: Sequence[Row]) -> str:
     """Histograms of the metrics, docked and failed stacked."""
-    figure = Figure(figsize=(11.0, 5.4), layout="constrained")
-    for number, (column, label, factor) in enumerate(DISTRIBUTIONS):
-        axes = figure.add_subplot(2, 3, number + 1)
+    shown = [entry for entry in DISTRIBUTIONS if any(row[entry[0]] is not None for row in rows)]
+    lines = 1 + len(shown) // 3  # the legend takes a place too
+    figure = Figure(figsize=(11.0, 2.7 * lines), layout="constrained")
+    for number, (column, label, factor) in enumerate(shown):
+        axes = figure.add_subplot(lines, 3, number + 1)
         docked = _values(rows, column, factor, success=True)
         failed = _values(rows, column, factor, success=False)
         both = [*docked, *failed]
@@ -167,7 +176,7 @@ def distribution_figure(rows: Sequence[Row]) -> str:
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_ylabel("episodes" if number % 3 == 0 else "")
         _tidy(axes)
-    legend = figure.add_subplot(2, 3, 6)
+    legend = figure.add_subplot(lines, 3, len(shown) + 1)
     legend.axis("off")
     for colour, name in ((DOCKED, "docked"), (FAILED, "failed")):
         legend.bar(0, 0, color=colour, label=name)

@@ -15,7 +15,7 @@ from auvdock.campaign.row import Row
 from auvdock.campaign.statistics import Rate
 from auvdock.episode.result import FAILURE_REASONS
 
-__all__ = ["html_page", "recording_path"]
+__all__ = ["html_page", "recording_path", "replay_command"]
 
 LISTED = 200
 """Most failures that the page lists."""
@@ -191,7 +191,7 @@ def _link(folder: Path, row: Row) -> str:
 def replay_command(folder: Path, episode: int) -> str:
     """The command that flies an episode again and records it."""
     origin, record = shlex.quote(f"{folder}#{episode}"), shlex.quote(str(recording_path(folder, episode)))
-    return f"auvdock dock conical --from {origin} --record {record}"
+    return f"auvdock dock --from {origin} --record {record}"
 
 
 def _reproduce(campaign: Campaign) -> str:

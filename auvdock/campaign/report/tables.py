@@ -14,8 +14,11 @@ from auvdock.episode.result import FAILURE_REASONS
 
 __all__ = ["csv_table", "latex_table"]
 
-MEDIANS = ("distortion_rate", "entry_distance_m", "time_s", "energy_j", "peak_contact_force_n")
-"""Columns whose median the CSV gives."""
+MEDIANS = (
+    *("distortion_rate", "entry_distance_m", "time_s", "energy_j", "peak_contact_force_n"),
+    *("touchdown_speed_m_s", "final_position_error_m", "final_heading_error_rad"),
+)
+"""Columns whose median the CSV gives; empty where a station has no such thing."""
 
 
 def csv_table(campaign: Campaign) -> str:

@@ -1,0 +1,107 @@
+"""Flying one episode from the command line: a new one by flags, or one of a campaign again."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import cv2
+
+from auvdock.campaign.replay import StoredEpisode, stored_episode
+from auvdock.campaign.row import differences, row_of
+from auvdock.cli.display import ProgressDisplay, print_result
+from auvdock.cli.dock_flags import DockFlags
+from auvdock.cli.parsing import base_config, parse
+from auvdock.core.errors import ConfigError
+from auvdock.episode.result import EpisodeResult
+from auvdock.episode.runner import EpisodeRunner
+from auvdock.episode.trace import EpisodeObserver
+
+__all__ = ["reference_in", "run_dock"]
+
+
+def run_dock(command: type[DockFlags], argv: Sequence[str], prog: str, station: str, title: str) -> int:
+    """Run a docking command.
+
+    Args:
+        command: its flags.
+        argv: what the user gave.
+        prog: the command's name, for its help.
+        station: key of `auvdock.campaign.config.STATIONS`.
+        title: of the result's table.
+
+    Returns:
+        The exit code.
+    """
+    stored = _stored(argv, station)
+    args = parse(command, argv, prog, _defaults(command, argv, stored, station))
+    runner = EpisodeRunner(args.resolve())
+    if stored is None or (runner.cfg, args.seed) != (stored.cfg, stored.spec.seed):
+        return _fly(runner, args, title)  # no episode of a campaign, or flags made it another one
+    return _fly(runner, args, title, lambda result: _tell_whether_equal(stored, result))
+
+
+def reference_in(argv: Sequence[str]) -> str | None:
+    """What `--from` names, if it is given."""
+    return _found(argv, "from")["from"]
+
+
+def _found(argv: Sequence[str], *flags: str) -> dict[str, str | None]:
+    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    for flag in flags:
+        finder.add_argument(f"--{flag}", default=None)
+    return vars(finder.parse_known_args(list(argv))[0])
+
+
+def _stored(argv: Sequence[str], station: str) -> StoredEpisode | None:
+    reference = reference_in(argv)
+    if reference is None:
+        return None
+    for flag, value in _found(argv, "level", "config").items():
+        if value is not None:
+            raise ConfigError(flag, value, "no such flag beside --from, which brings its own settings")
+    stored = stored_episode(reference)
+    if stored.station != station:
+        remedy = f"an episode of the {station} station; this one is flown by `auvdock dock {stored.station}`"
+        raise ConfigError("from", reference, remedy)
+    return stored
+
+
+def _defaults(command: type[DockFlags], argv: Sequence[str], stored: StoredEpisode | None, station: str) -> DockFlags:
+    if stored is not None:
+        return replace(command(), seed=stored.spec.seed, episode=stored.cfg)
+    return command() if {"-h", "--help"} & set(argv) else replace(command(), episode=base_config(argv, station))
+
+
+def _fly(
+    runner: EpisodeRunner, flags: DockFlags, title: str, check: Callable[[EpisodeResult], None] | None = None
+) -> int:
+    if flags.seed < 0:
+        raise ConfigError("seed", flags.seed, "a whole number of 0 or more")
+    cv2.setNumThreads(1)  # frames this small gain nothing from OpenCV's threads and stall on a busy machine
+    observers: list[EpisodeObserver] = []
+    if flags.record is not None:
+        from auvdock.recording.rerun_recorder import RerunRecorder
+
+        observers.append(RerunRecorder(flags.record))
+    if not flags.json:
+        observers.append(ProgressDisplay())
+    result = runner.run(flags.seed, observers)
+    if check is not None:
+        check(result)
+    if flags.json:
+        print(json.dumps(result.to_json(), allow_nan=False))
+    else:
+        print_result(result, flags.record, title)
+    return 0 if result.success else 1
+
+
+def _tell_whether_equal(stored: StoredEpisode, result: EpisodeResult) -> None:
+    if stored.row is None:
+        return
+    changed = differences(stored.row, row_of(stored.spec, result))
+    found = f"differs from the campaign's in {', '.join(changed)}" if changed else "equals the campaign's, bit for bit"
+    print(f"auvdock: episode {stored.spec.episode} {found}", file=sys.stderr)
