@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array, Image
 from auvdock.core.contracts import Frame, RegionOfInterest, TagDetection
 from auvdock.core.errors import ConfigError
-from auvdock.perception.landing.tag_edges import corners_from_lines, line_through, refined_corners
+from auvdock.perception.landing.tag_edges import corners_from_lines, lines_through, refined_corners
 
 __all__ = ["TAG_DETECTORS", "AprilTagDetector", "ContourTagDetector", "TagDetector", "make_tag_detector"]
 
@@ -181,14 +181,17 @@ def _scales(side_px: int, is_region: bool) -> tuple[float, ...]:
 
 def _patches(frame: Frame, regions: Sequence[RegionOfInterest]) -> list[tuple[Image, Array]]:
     """(grey patch, (2,) its origin in the image) of each region."""
-    grey = np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
     if not regions:
-        return [(grey, np.zeros(2))]
+        return [(_grey(frame.image), np.zeros(2))]
     return [
-        (np.ascontiguousarray(grey[r.y0 : r.y1, r.x0 : r.x1]), np.array([float(r.x0), float(r.y0)]))
+        (_grey(frame.image[r.y0 : r.y1, r.x0 : r.x1]), np.array([float(r.x0), float(r.y0)]))
         for r in regions
         if r.x1 - r.x0 >= _MIN_REGION_PX and r.y1 - r.y0 >= _MIN_REGION_PX
     ]
+
+
+def _grey(image: Image) -> Image:
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
 
 
 def _quadrilateral(contour: NDArray[np.int32]) -> Array | None:
@@ -206,20 +209,22 @@ def _quadrilateral(contour: NDArray[np.int32]) -> Array | None:
 
 def _fitted(contour: Array, quad: Array, frame: Frame) -> tuple[Array, float] | None:
     """Corners where lines through the contour's sides meet, and their standard deviation; sides without their ends."""
-    lines: list[tuple[Array, Array]] = []
-    variance = 0.0
+    sides: list[Array] = []
     for side in range(4):
         start, way = quad[side], quad[(side + 1) % 4] - quad[side]
         square = float(way @ way)
         share = (contour - start) @ way / square
         gap = np.abs((contour - start) @ np.array([-way[1], way[0]])) / np.sqrt(square)
-        near = contour[(share > 0.1) & (share < 0.9) & (gap < 0.1 * np.sqrt(square) + 1.0)]
-        fitted = line_through(frame.camera.normalise(near.astype(np.float64)))
-        if fitted is None:
-            return None
-        lines.append(fitted[:2])
-        variance = max(variance, 4.0 * fitted[2] ** 2 / fitted[3])
-    corners = corners_from_lines(lines, frame.camera)
+        sides.append(contour[(share > 0.1) & (share < 0.9) & (gap < 0.1 * np.sqrt(square) + 1.0)])
+    points = np.zeros((4, max(map(len, sides)), 2))
+    good = np.zeros(points.shape[:2], dtype=np.bool_)
+    for row, near in enumerate(sides):
+        points[row, : len(near)] = near
+        good[row, : len(near)] = True
+    lines = lines_through(frame.camera.normalise(points.reshape(-1, 2)).reshape(points.shape), good)
+    corners = corners_from_lines(lines, frame.camera) if lines is not None else None
+    if lines is None or corners is None:
+        return None
     # A contour runs through whole pixels: its lines are no better than a third of one.
     focal = float(frame.camera.matrix[0, 0])
-    return None if corners is None else (corners, float(np.hypot(0.3, focal * np.sqrt(variance))))
+    return corners, float(np.hypot(0.3, focal * np.sqrt(lines.variance_at_ends())))
