@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -97,7 +98,7 @@ class Camera:
             & (pixels[:, 1] < self.height_px - 0.5)
         )
 
-    @property
+    @cached_property
     def _max_tangent(self) -> float:
         right, bottom = self.width_px - 0.5, self.height_px - 0.5
         corner = self.normalise(np.array([[-0.5, -0.5], [right, bottom], [right, -0.5], [-0.5, bottom]]))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
+from auvdock.core.transforms import cross
 from auvdock.optics.beam_pieces import BeamPieces, PieceLight
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet
@@ -99,7 +100,7 @@ class BeamImage:
         along /= math.sqrt(2.0 * math.pi) * width
         if float(along.max()) < floor:
             return None
-        frame = np.array([beam.ray_camera, beam.along_camera, np.cross(beam.ray_camera, beam.along_camera)])
+        frame = np.array([beam.ray_camera, beam.along_camera, cross(beam.ray_camera, beam.along_camera)])
         local = self._rays @ frame.T.astype(np.float32)
         place = np.arctan2(local[:, 1], local[:, 0])
         place *= np.float32((_RIBBON - 1) / span)

@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from auvdock.core.camera import CameraCfg, make_camera
 from auvdock.core.errors import ConfigError
+from auvdock.core.linear import solve_positive
 from auvdock.core.marine import flip_matrix, flip_twist, flip_vector
 from auvdock.core.transforms import (
+    cross,
     euler_zyx_from_rotation,
     invert,
     make_transform,
@@ -123,3 +125,23 @@ def test_fields_of_view_that_need_a_folding_lens_are_refused():
 def test_parallel_direction_and_up_are_refused():
     with pytest.raises(ValueError, match="parallel"):
         rotation_looking_along(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 2.0]))
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6))
+def test_cross_product_is_numpys(values):
+    a, b = np.array(values[:3]), np.array(values[3:])
+    np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
+
+
+@pytest.mark.parametrize("columns", [(), (4,)])
+def test_positive_systems_are_solved_as_numpy_solves_them(columns):
+    rng = np.random.default_rng(4)
+    root = rng.normal(size=(6, 6))
+    matrix, right = root @ root.T + 0.1 * np.eye(6), rng.normal(size=(6, *columns))
+    before = matrix.copy(), right.copy()
+    found = solve_positive(matrix, right)
+    assert found is not None
+    np.testing.assert_allclose(found, np.linalg.solve(matrix, right), rtol=1e-9)
+    np.testing.assert_array_equal(matrix, before[0])
+    np.testing.assert_array_equal(right, before[1])
+    assert solve_positive(matrix - 100.0 * np.eye(6), right) is None

@@ -97,6 +97,25 @@ def test_expected_leaves_the_filter_as_it_is():
         np.testing.assert_array_equal(a, c)
 
 
+def test_a_measurement_after_a_look_ahead_counts():
+    flight = Descent(np.array([0.3, -0.2, 3.0]), 0.4, 0.5)
+    answers: list[tuple[Array, Array]] = []
+    for looks in (True, False):
+        rng = np.random.default_rng(1)
+        senses = Senses(flight, rng)
+        held = LandingFilter(FilterCfg(), AttitudeCfg(), CAMERA, 0.0)
+        first, second = senses.proprioception(0.0), senses.proprioception(0.05)
+        attitude = held.measured_attitude(first)
+        held.start([level(flight.camera(0.0), LIGHTS, 0.1, attitude, rng)], first)
+        if looks:
+            held.expected(second)
+        held.update([level(flight.camera(0.0), CORNERS, 0.1, attitude, rng)], first)
+        held.predict(second)
+        answers.append(held.pose(second))
+    for a, b in zip(*answers, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
 def test_weighted_mean_is_consistent_and_no_worse_than_either():
     """P_out = K1 P_L + K2 P_A: its covariance is at most either's, and its NEES over 300 frames that of χ²(6)."""
     rng = np.random.default_rng(2)

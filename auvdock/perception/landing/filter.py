@@ -21,7 +21,14 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Proprioception
-from auvdock.core.transforms import euler_zyx_from_rotation, make_transform, rotation_from_euler_zyx, wrap_angle
+from auvdock.core.linear import solve_positive
+from auvdock.core.transforms import (
+    cross,
+    euler_zyx_from_rotation,
+    make_transform,
+    rotation_from_euler_zyx,
+    wrap_angle,
+)
 from auvdock.perception.landing.config import AttitudeCfg, FilterCfg
 from auvdock.perception.landing.level import LevelPose, pose_offset
 
@@ -50,6 +57,8 @@ class LandingFilter:
         self._state: Array | None = None
         self._covariance: Array = np.zeros((6, 6))
         self._last: Proprioception | None = None
+        self._ahead: tuple[Proprioception, Array | None, Array] | None = None
+        """What `expected` found for a sample, until the state changes: `predict` is asked for the same."""
 
     @property
     def running(self) -> bool:
@@ -71,7 +80,11 @@ class LandingFilter:
     def predict(self, proprioception: Proprioception) -> None:
         """Move the state on to the time of a sample."""
         last, self._last = self._last, proprioception
+        ahead, self._ahead = self._ahead, None
         if self._state is None or last is None:
+            return
+        if ahead is not None and ahead[0] is proprioception:
+            _, self._state, self._covariance = ahead
             return
         dt = proprioception.time_s - last.time_s
         if dt <= 0.0:
@@ -84,10 +97,12 @@ class LandingFilter:
         """(pose (4, 4), covariance (6, 6)) that `predict` would give, the filter left as it is; None while empty."""
         if self._state is None or self._last is None:
             return None
-        state, covariance, last = self._state, self._covariance, self._last
+        before = self._state, self._covariance, self._last
         self.predict(proprioception)
         answer = self.pose(proprioception)
-        self._state, self._covariance, self._last = state, covariance, last
+        ahead = proprioception, self._state, self._covariance
+        self._state, self._covariance, self._last = before
+        self._ahead = ahead
         return answer
 
     def pose(self, proprioception: Proprioception) -> tuple[Array, Array]:
@@ -104,7 +119,8 @@ class LandingFilter:
         """Squared Mahalanobis distance of a level's pose from the state."""
         innovation, by_state, noise = self._innovation([level], proprioception)
         spread = by_state @ self._covariance @ by_state.T + noise
-        return float(innovation @ np.linalg.solve(spread, innovation))
+        weighed = solve_positive(spread, innovation)
+        return math.inf if weighed is None else float(innovation @ weighed)
 
     def update(self, levels: Sequence[LevelPose], proprioception: Proprioception) -> None:
         """Correct the state by one or two levels of the same frame; they share the inclinometer's noise."""
@@ -113,6 +129,7 @@ class LandingFilter:
         innovation, by_state, noise = self._innovation(levels, proprioception)
         spread = by_state @ self._covariance @ by_state.T + noise
         gain = np.linalg.solve(spread, by_state @ self._covariance).T
+        self._ahead = None
         self._state = self._state + gain @ innovation
         self._state[3] = wrap_angle(float(self._state[3]))
         kept = np.eye(6) - gain @ by_state
@@ -125,7 +142,7 @@ class LandingFilter:
         yaw = euler_zyx_from_rotation(first[:3, :3] @ self._body_camera.T)[2]
         self._state = np.array([*first[:3, 3].tolist(), yaw, 0.0, 0.0])
         self._covariance = np.diag([_WIDE_M2] * 3 + [1.0] + [self._tilt_bias] * 2)
-        self._last = proprioception
+        self._last, self._ahead = proprioception, None
         self.update(levels, proprioception)
 
     def place(self, T_station_camera: Array, covariance: Array, proprioception: Proprioception) -> None:
@@ -135,14 +152,11 @@ class LandingFilter:
         state = np.array([*T_station_camera[:3, 3].tolist(), yaw, measured[0] - roll, measured[1] - pitch])
         by_state, _ = self._jacobians(state, proprioception, T_station_camera[:3, :3])
         back = np.linalg.inv(by_state)
-        self._state, self._last = state, proprioception
+        self._state, self._last, self._ahead = state, proprioception, None
         self._covariance = back @ covariance @ back.T
 
     def _transform(self, state: Array, proprioception: Proprioception) -> Array:
-        roll, pitch, _ = proprioception.euler_zyx_rad.tolist()
-        _, _, _, yaw, roll_error, pitch_error = state.tolist()
-        rotation = rotation_from_euler_zyx(roll - roll_error, pitch - pitch_error, yaw)
-        return make_transform(rotation @ self._body_camera, state[:3])
+        return make_transform(_R_station_body(state, proprioception) @ self._body_camera, state[:3])
 
     def _jacobians(self, state: Array, proprioception: Proprioception, rotation: Array) -> tuple[Array, Array]:
         """d(error coordinates of the pose) / d(state) (6, 6) and / d(noise of roll, pitch) (6, 2)."""
@@ -181,9 +195,8 @@ class LandingFilter:
 
     def _velocity(self, state: Array, sample: Proprioception) -> Array:
         """(3,) velocity of the camera in the station frame."""
-        body = sample.velocity_ground_m_s + np.cross(sample.angular_velocity_rad_s, self._arm_m)
-        rotation = self._transform(state, sample)[:3, :3] @ self._body_camera.T
-        return rotation @ body
+        body = sample.velocity_ground_m_s + cross(sample.angular_velocity_rad_s, self._arm_m)
+        return _R_station_body(state, sample) @ body
 
     def _spread(self, last: Proprioception, now: Proprioception, moved: Array, dt: float) -> Array:
         """F P Fᵀ + Q."""
@@ -203,6 +216,12 @@ class LandingFilter:
         covariance[2, 2] += step
         covariance[3, 3] += turn
         return covariance
+
+
+def _R_station_body(state: Array, sample: Proprioception) -> Array:
+    roll, pitch, _ = sample.euler_zyx_rad.tolist()
+    _, _, _, yaw, roll_error, pitch_error = state.tolist()
+    return rotation_from_euler_zyx(roll - roll_error, pitch - pitch_error, yaw)
 
 
 def _yaw_rate(sample: Proprioception) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import PoseEstimate
+from auvdock.core.linear import solve_positive
 from auvdock.core.transforms import make_transform
 from auvdock.perception.landing.config import AttitudeCfg
 
@@ -19,6 +20,7 @@ __all__ = ["LevelPose", "LevelSolver", "pose_offset", "rotated"]
 _MAX_ITERATIONS = 20
 _DECREMENT = 1e-8
 _NO_ROTATION = np.zeros(3)
+_IDENTITY = np.eye(6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,14 +104,13 @@ class LevelSolver:
                 damping = max(10.0 * damping, 1e-3)
             normal, gradient = kept[0] + kept[2], kept[1] + kept[3]
             damped = normal + np.diag(damping * normal.diagonal()) if damping > 1e-9 else normal
-            try:
-                step: Array = -np.linalg.solve(damped, gradient).astype(np.float64)
-            except np.linalg.LinAlgError:
+            back = solve_positive(damped, gradient)
+            if back is None:
                 return None
             # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
-            if damping <= 1e-9 and -float(gradient @ step) < _DECREMENT:
+            if damping <= 1e-9 and float(gradient @ back) < _DECREMENT:
                 break
-            trial = (position + step[:3], rotated(rotation, step[3:]))
+            trial = (position - back[:3], rotated(rotation, -back[3:]))
         if kept is None:
             return None
         return self._finish(kept, best, make_transform(rotation, position), sigma_px, ids, solver)
@@ -127,15 +128,15 @@ class LevelSolver:
         # 2 n residuals and three of attitude, less six unknowns.
         worse = max(1.0, cost / (2 * len(sigma_px) - 3))
         information, gradient = information / worse, gradient / worse
-        try:
-            covariance = np.linalg.inv(information + prior)
-            # Three points may leave a direction open: a trace of information keeps the inverse finite.
-            pull = -np.linalg.solve(information + 1e-9 * np.trace(information) / 6.0 * np.eye(6), gradient)
-        except np.linalg.LinAlgError:
+        covariance = solve_positive(information + prior, _IDENTITY)
+        # Three points may leave a direction open: a trace of information keeps the inverse finite.
+        open_ = 1e-9 * float(information.trace()) / 6.0
+        back = solve_positive(information + open_ * _IDENTITY, gradient)
+        if covariance is None or back is None:
             return None
         covariance = 0.5 * (covariance + covariance.T)
         estimate = PoseEstimate(T_station_camera, covariance, ids, solver, float(residual.mean()))
-        return LevelPose(estimate, information, pull, prior, residual / sigma_px, cost)
+        return LevelPose(estimate, information, -back, prior, residual / sigma_px, cost)
 
     def _evaluate(
         self, points: Array, pixels: Array, sigma: Array, attitude: Array, position: Array, rotation: Array

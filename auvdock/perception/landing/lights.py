@@ -10,6 +10,7 @@ from auvdock.core.arrays import Array, IntArray
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, Detections
 from auvdock.core.landing_station import LandingStationCfg
+from auvdock.core.linear import solve_positive
 from auvdock.core.transforms import invert, make_transform
 from auvdock.perception.landing.config import LightLevelCfg
 from auvdock.perception.landing.identity import hypotheses, match
@@ -192,7 +193,8 @@ class LightLevel:
 def _far(pose: LevelPose, T_expected: Array, covariance: Array) -> bool:
     """Whether a pose contradicts what was expected."""
     offset = pose_offset(T_expected, pose.T_station_camera)
-    return float(offset @ np.linalg.solve(covariance + pose.estimate.covariance, offset)) > _FAR
+    weighed = solve_positive(covariance + pose.estimate.covariance, offset)
+    return weighed is None or float(offset @ weighed) > _FAR
 
 
 def _apart(a: NamedLights, b: NamedLights) -> bool:

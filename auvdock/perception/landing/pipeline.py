@@ -107,9 +107,10 @@ class LandingPerception:
         self._tracks.update(detections)
         self._filter.predict(proprioception)
         attitude = self._filter.measured_attitude(proprioception)
-        expected = self._filter.pose(proprioception)[0] if self._filter.running else None
-        tag = self._tag.measure(tags, attitude, expected) if cfg.levels != "lights" else None
-        named = self._name(detections, attitude, proprioception) if cfg.levels != "tag" else None
+        expected = self._filter.pose(proprioception) if self._filter.running else None
+        place = expected[0] if expected is not None else None
+        tag = self._tag.measure(tags, attitude, place) if cfg.levels != "lights" else None
+        named = self._name(detections, attitude, proprioception, expected) if cfg.levels != "tag" else None
         lights = named.pose if named is not None else None
         used_lights, used_tag = self._fuse(lights, tag, proprioception)
         self._missed_lights = 0 if used_lights else self._missed_lights + 1
@@ -141,10 +142,15 @@ class LandingPerception:
         self._confirmed = 0
         self._refused_lights = self._refused_tag = 0
 
-    def _name(self, detections: Detections, attitude: Array, proprioception: Proprioception) -> NamedLights | None:
-        if self._filter.running:
-            expected, covariance = self._filter.pose(proprioception)
-            named = self._lights.follow(detections, attitude, expected, covariance)
+    def _name(
+        self,
+        detections: Detections,
+        attitude: Array,
+        proprioception: Proprioception,
+        expected: tuple[Array, Array] | None,
+    ) -> NamedLights | None:
+        if expected is not None:
+            named = self._lights.follow(detections, attitude, *expected)
             if named is not None:
                 return named
         height = self._station.depth_m - proprioception.depth_m
