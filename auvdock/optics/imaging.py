@@ -124,7 +124,7 @@ class UnderwaterCamera:
         hidden = (TAG_GEOM,) if tag is not None else ()
         self._surfaces = Surfaces(self.lit, scene.model, hidden) if scene is not None and cfg.surfaces else None
         solid = self.lit.lens.solid_angle_sr.astype(np.float32)
-        self._solid_angle = solid[:, :, None]
+        self._solid_angle = np.repeat(solid[:, :, None], 3, axis=2)
         self._beam_image: BeamImage | None = None
         lens = self.lit.lens
         # Enlarged coarse pixels may reach over the image's right and lower edge.
@@ -167,7 +167,8 @@ class UnderwaterCamera:
         if not self.exposure.settled:
             self._settle(view)
         exposure_s, gain = self.exposure.exposure_s, self.exposure.gain
-        image = self._sensor.expose(self.electrons(view, exposure_s, gain), gain)
+        self.electrons(view, exposure_s, gain)
+        image = self._sensor.expose(self._whole, gain)
         code = self.lit.scale(gain).metered_code(self.exposure.metered)
         self.exposure.update(saturated_share(image, code))
         return Shot(Frame(image, time_s, self._camera, exposure_s, gain, self._response), view, exposure_s, gain)

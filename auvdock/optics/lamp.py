@@ -100,7 +100,9 @@ class VehicleLamp:
 
         The angle from the axis is taken as θ² = 2 (1 - cos θ) (1 + (1 - cos θ) / 6), 1 % low at 70°.
         """
-        light = np.zeros((len(rays), 3), dtype=np.float32)
+        # A row per band: NumPy is slow over the last three of an array (n, 3).
+        light = np.zeros((3, len(rays)), dtype=np.float32)
+        depth = rays[:, 2] * distance
         loss = -self._loss_per_m.astype(np.float32)
         half = math.radians(self.cfg.beam_angle_deg) / 2.0
         narrow = np.float32(-2.0 * math.log(2.0) / half**2)
@@ -111,15 +113,15 @@ class VehicleLamp:
             d2 += float(position @ position)
             np.maximum(d2, np.float32(_LEAST_M2), out=d2)
             d = np.sqrt(d2)
-            cosine = (rays[:, 2] * distance - position[2]) / d
+            cosine = (depth - position[2]) / d
             np.clip(cosine, 0.0, 1.0, out=cosine)
             versed = 1.0 - cosine
             versed *= narrow * (1.0 + versed * np.float32(1.0 / 6.0))
             shape = cosine / d2
             for band in range(3):
-                light[:, band] += shape * cv2.exp(versed + loss[band] * d).ravel()
-        light *= self.peak_w_sr.astype(np.float32)
-        return light
+                light[band] += shape * cv2.exp(versed + loss[band] * d).ravel()
+        light *= self.peak_w_sr.astype(np.float32)[:, None]
+        return light.T
 
     def brightest(self, distance_m: Array) -> Array:
         """(n, 3) upper bound of the irradiance on anything at distances (n,) from the camera."""
@@ -143,10 +145,11 @@ class VehicleLamp:
         row *= self._pixels
         row += self._column
         flat = self._table.reshape(-1, 3)
-        lower = flat[row]
-        upper = flat[row + self._pixels]
+        lower = flat.take(row, 0)
+        row += self._pixels
+        upper = flat.take(row, 0)
         upper -= lower
-        upper *= place[:, :, None]
+        upper *= cv2.cvtColor(place, cv2.COLOR_GRAY2RGB)
         upper += lower
         return upper
 

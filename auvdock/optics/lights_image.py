@@ -50,7 +50,7 @@ class LightsImage:
         self._last_inner = int(math.sqrt(2.0 * math.sin(self._split_rad / 2.0)) * self._scale)
         self._inner_angle2 = (self._angle[: self._last_inner + 1] ** 2).astype(np.float32)
         self._rays = lens.rays.astype(np.float32)
-        self._coarse_solid_angle = lens.solid_angle_sr.astype(np.float32)[:, :, None]
+        self._coarse_solid_angle = np.repeat(lens.solid_angle_sr.astype(np.float32)[:, :, None], 3, axis=2)
         self._channel = lights.electrons_per_j * lens.aperture_m2
         self._reach = np.arange(-self._split_px, self._split_px + 1, dtype=np.float64)
 

@@ -59,6 +59,7 @@ class Surfaces:
         self._map_x, self._map_y = map_x.astype(np.float32), map_y.astype(np.float32)
         self._stretch = np.sqrt(1.0 + np.sum(tangents**2, axis=2)).astype(np.float32)
         self._rays = lens.rays.astype(np.float32)
+        self._rays_by_row = np.ascontiguousarray(self._rays.T)
         self.distance: NDArray[np.float32] | None = None
         """Distance along the rays of the lens' coarse grid (rows, columns) in the last image; `inf` for nothing."""
 
@@ -162,19 +163,21 @@ class Surfaces:
         rows, columns = self._lit.lens.shape
         coarse = cv2.resize(distance, (columns, rows), interpolation=cv2.INTER_NEAREST)
         self.distance = np.asarray(coarse, dtype=np.float32)
-        z = self.distance.reshape(-1, 1)
-        points = self._rays * z
+        z = self.distance.ravel()
         lamps = ((self._lamps - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]).astype(np.float32)
-        d2 = points @ (-2.0 * lamps.T)
-        d2 += np.sum(lamps**2, axis=1)
+        # A row per lamp and per band: NumPy is slow over arrays whose last axis is short.
+        d2 = (-2.0 * lamps) @ (self._rays_by_row * z)
+        d2 += np.sum(lamps**2, axis=1)[:, None]
         d2 += z * z
         np.maximum(d2, np.float32(LAMP_M2), out=d2)
-        weight = cv2.exp(cv2.sqrt(d2) * (-self._lamp_absorption).astype(np.float32))
+        way = np.asarray(cv2.sqrt(d2), dtype=np.float32)
+        way *= (-self._lamp_absorption).astype(np.float32)[:, None]
+        weight = np.asarray(cv2.exp(way, way), dtype=np.float32)
         weight /= d2
-        light = weight @ self._spill_w_sr.astype(np.float32)
+        light = self._spill_w_sr.astype(np.float32).T @ weight
         if self._lit.lamp is not None:
-            light += self._lit.lamp.irradiance_along(self._rays, self.distance.ravel())
-        return light.reshape(rows, columns, 3)
+            light += self._lit.lamp.irradiance_along(self._rays, z).T
+        return np.asarray(cv2.merge(list(light.reshape(3, rows, columns))), dtype=np.float32)
 
 
 def _exponential(distance: NDArray[np.float32], per_m: Array) -> NDArray[np.float32]:

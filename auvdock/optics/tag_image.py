@@ -87,7 +87,7 @@ class TagImage:
         if hidden:
             texture[:, :, 0] = texture[:, :, 1] * np.float32(_COVER)
         unit, veil = self._shading(region, back, T_world_camera, exposure_s)
-        under = self._enlarged(surfaces, region) if surfaces is not None else None
+        under = self._less(surfaces, region) if surfaces is not None else None
         tangents, target = self._lens_map()[y0:y1, x0:x1], image[y0:y1, x0:x1]
         rows = max(_STRIP_PX // (x1 - x0), 1)
         for top in range(0, y1 - y0, rows):
@@ -97,7 +97,7 @@ class TagImage:
             cv2.accumulateProduct(unit[strip], _thrice(drawn, 0), target[strip])
             beside = None if veil is None else veil[strip]
             if under is not None:
-                beside = -under[strip] if beside is None else beside - under[strip]
+                beside = under[strip] if beside is None else beside + under[strip]
             if beside is not None:
                 cv2.accumulateProduct(beside, _thrice(drawn, 1), target[strip])
 
@@ -181,14 +181,14 @@ class TagImage:
         solid = lens.solid_angle_at(pixels)[:, None] * exposure_s
         return _enlarge(unit * solid, region), _enlarge(veil * solid, region) if veil.any() else None
 
-    def _enlarged(self, coarse: NDArray[np.float32], region: tuple[int, int, int, int]) -> NDArray[np.float32]:
-        """The region of a coarser image (h, w, 3) as `cv2.resize` would enlarge it."""
+    def _less(self, coarse: NDArray[np.float32], region: tuple[int, int, int, int]) -> NDArray[np.float32]:
+        """The negative of the region of a coarser image (h, w, 3) as `cv2.resize` would enlarge it."""
         x0, y0, x1, y1 = region
         lens = self.scene.lit.lens
         step = lens.shape[1] * lens.factor // coarse.shape[1]
         left, top = max(x0 // step - 1, 0), max(y0 // step - 1, 0)
         right, bottom = -(-x1 // step) + 1, -(-y1 // step) + 1
-        part = np.ascontiguousarray(coarse[top:bottom, left:right])
+        part = np.negative(coarse[top:bottom, left:right])
         size = (part.shape[1] * step, part.shape[0] * step)
         whole = cv2.resize(part, size, interpolation=cv2.INTER_LINEAR)
         whole = np.asarray(whole, dtype=np.float32)
