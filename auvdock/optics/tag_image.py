@@ -19,9 +19,8 @@ from auvdock.optics.tag_scene import TagScene
 
 __all__ = ["TagImage"]
 
-_NO_MAP: NDArray[np.float32] = np.empty(0, dtype=np.float32)
 _PAD_PX = 5
-_STRIP_PX = 16384
+_STRIP_PX = 32768
 """Pixels that are drawn at a time: few enough to stay in a processor's cache from one step to the next."""
 _SPARE_TEXELS = 4.0
 _TEXEL_PX = 0.8
@@ -83,30 +82,34 @@ class TagImage:
         first, count = self._pattern.texels(step, sigma_u, sigma_v)
         to_texel = np.array([[1.0 / step, 0.0, -first / step], [0.0, 1.0 / step, -first / step], [0.0, 0.0, 1.0]])
         window = self._window(region, to_texel @ back, count)
-        texture = self._pattern.texture(step, sigma_u, sigma_v, window)
+        reflected, covered = self._pattern.texture(step, sigma_u, sigma_v, window)
         if hidden:
-            texture[:, :, 0] = texture[:, :, 1] * np.float32(_COVER)
+            reflected = np.full_like(reflected, _COVER) if covered is None else covered * np.float32(_COVER)
         unit, veil = self._shading(region, back, T_world_camera, exposure_s)
         under = self._less(surfaces, region) if surfaces is not None else None
-        tangents, target = self._lens_map()[y0:y1, x0:x1], image[y0:y1, x0:x1]
+        to_window = np.array([[1.0, 0.0, -window[0]], [0.0, 1.0, -window[1]], [0.0, 0.0, 1.0]]) @ to_texel @ back
+        tangents, target = self._lens_map()[:, y0:y1, x0:x1], image[y0:y1, x0:x1]
         rows = max(_STRIP_PX // (x1 - x0), 1)
         for top in range(0, y1 - y0, rows):
             strip = slice(top, min(top + rows, y1 - y0))
-            place = cv2.perspectiveTransform(tangents[strip], to_texel @ back)
-            drawn = _read(texture, np.asarray(place, dtype=np.float32), window)
-            cv2.accumulateProduct(unit[strip], _thrice(drawn, 0), target[strip])
+            place = _mapped(tangents[0, strip], tangents[1, strip], to_window)
+            cv2.accumulateProduct(unit[strip], _read(reflected, place), target[strip])
             beside = None if veil is None else veil[strip]
             if under is not None:
                 beside = under[strip] if beside is None else beside + under[strip]
-            if beside is not None:
-                cv2.accumulateProduct(beside, _thrice(drawn, 1), target[strip])
+            if beside is None:
+                continue
+            if covered is None:
+                cv2.add(target[strip], beside, target[strip])
+            else:
+                cv2.accumulateProduct(beside, _read(covered, place), target[strip])
 
     def _window(self, region: tuple[int, int, int, int], to_texel: Array, count: int) -> tuple[int, int, int, int]:
         """Texels x0, y0, x1, y1 that a region shows: from a nearby tag's they are few."""
         x0, y0, x1, y1 = region
-        tangents = self._lens_map()[y0:y1, x0:x1]
+        t = self._lens_map()[:, y0:y1, x0:x1]
         # Lens and plane keep inside and outside apart, so the region's rim shows the outermost texels.
-        rim = np.concatenate([tangents[0], tangents[-1], tangents[:, 0], tangents[:, -1]]).astype(np.float64)
+        rim = np.concatenate([t[:, 0], t[:, -1], t[:, :, 0], t[:, :, -1]], axis=1).astype(np.float64).T
         place = np.column_stack([rim, np.ones(len(rim))]) @ to_texel.T
         if not float(place[:, 2].min()) > 0.0:
             # It reaches to the plane's horizon.
@@ -117,12 +120,12 @@ class TagImage:
         return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
     def _lens_map(self) -> NDArray[np.float32]:
-        """(H, W, 2) tangents of the ray through each pixel."""
+        """(2, H, W) tangents of the ray through each pixel, to the right and down."""
         if self._tangents is None:
             width, height = self._size
             grid = np.stack(np.meshgrid(np.arange(float(width)), np.arange(float(height))), axis=2)
             tangents = self.scene.lit.camera.normalise(grid.reshape(-1, 2))
-            self._tangents = tangents.reshape(height, width, 2).astype(np.float32)
+            self._tangents = np.ascontiguousarray(tangents.T, dtype=np.float32).reshape(2, height, width)
         return self._tangents
 
     def _region(self, border_camera: Array) -> tuple[int, int, int, int] | None:
@@ -170,7 +173,7 @@ class TagImage:
         x, y = x0 + share * (x1 - x0) - 0.5, y0 + share * (y1 - y0) - 0.5
         columns = np.clip(np.rint(x).astype(int), x0, x1 - 1)
         rows = np.clip(np.rint(y).astype(int), y0, y1 - 1)
-        tangents = self._lens_map()[np.ix_(rows, columns)].reshape(-1, 2).astype(np.float64)
+        tangents = self._lens_map()[:, rows[:, None], columns].reshape(2, -1).T.astype(np.float64)
         cells = np.column_stack([tangents, np.ones(len(tangents))]) @ back.T
         cells /= cells[:, 2:]
         # Far outside the tag's outline the plane may run away to the horizon.
@@ -195,21 +198,23 @@ class TagImage:
         return whole[y0 - top * step : y1 - top * step, x0 - left * step : x1 - left * step]
 
 
-def _read(
-    texture: NDArray[np.float32], place: NDArray[np.float32], window: tuple[int, int, int, int]
-) -> NDArray[np.float32]:
-    """(h, w, 2) a window of a texture at places (h, w, 2) on the whole of it, which are changed."""
-    # Whole texels are taken off after rounding, which is exact; both coordinates at once, as a complex number.
-    shifted = place.view(np.complex64)
-    shifted -= np.complex64(complex(window[0], window[1]))
-    drawn = cv2.remap(texture, place, _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0.0)
-    return np.asarray(drawn, dtype=np.float32)
+_Place = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""Where each pixel (h, w) falls in a texture: columns and rows."""
 
 
-def _thrice(values: NDArray[np.float32], channel: int) -> NDArray[np.float32]:
-    """(h, w, 3) one channel of an image (h, w, 2) for red, green and blue."""
-    grey = np.ascontiguousarray(values[:, :, channel])
-    return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), dtype=np.float32)
+def _mapped(x: NDArray[np.float32], y: NDArray[np.float32], homography: Array) -> _Place:
+    """Points (h, w) under a homography (3, 3)."""
+    rows: list[list[float]] = homography.tolist()
+    across, down, scale = (cv2.addWeighted(x, by_x, y, by_y, constant) for by_x, by_y, constant in rows)
+    across, down = cv2.divide(across, scale, across), cv2.divide(down, scale, down)
+    return np.asarray(across, dtype=np.float32), np.asarray(down, dtype=np.float32)
+
+
+def _read(texture: NDArray[np.float32], place: _Place) -> NDArray[np.float32]:
+    """(h, w, 3) a texture (rows, columns) between its texels, 0 off it, alike for red, green and blue."""
+    # One channel at a time: for two OpenCV rounds the place to a 32nd of a texel, and takes as long.
+    drawn = cv2.remap(texture, *place, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0.0)
+    return np.asarray(cv2.cvtColor(drawn, cv2.COLOR_GRAY2RGB), dtype=np.float32)
 
 
 def _enlarge(values: Array, region: tuple[int, int, int, int]) -> NDArray[np.float32]:

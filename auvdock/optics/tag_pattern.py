@@ -27,6 +27,8 @@ BLACK_SHARE = 0.1
 """Reflectance of black over white."""
 _REACH_SIGMAS = 4.5
 _PIECE = 16384
+_UNCOVERED = 1e-6
+"""A smaller share that is not the tag's is none."""
 
 
 def tag_cells(tag_id: int) -> NDArray[np.bool_]:
@@ -84,8 +86,8 @@ class TagPattern:
         sigma_u: float,
         sigma_v: float,
         window: tuple[int, int, int, int] | None = None,
-    ) -> NDArray[np.float32]:
-        """Reflectance × coverage and coverage, (rows, columns, 2).
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Reflectance × coverage and coverage, (rows, columns) each; None for the latter where all is covered.
 
         Args:
             cells_per_texel: distance of texels, in cells.
@@ -97,15 +99,15 @@ class TagPattern:
         x0, y0, x1, y1 = window if window is not None else (0, 0, count, count)
         place = np.asarray(first + cells_per_texel * np.arange(count), dtype=np.float64)
         across, down = _shares(place[x0:x1], sigma_u), _shares(place[y0:y1], sigma_v)
-        texture = np.empty((len(down), len(across), 2), dtype=np.float32)
-        reflected = down @ self._cells.astype(np.float32)
-        covered, columns = down.sum(axis=1), across.sum(axis=1)
+        reflected = np.empty((len(down), len(across)), dtype=np.float32)
+        striped = down @ self._cells.astype(np.float32)
         # In pieces too small for BLAS to call its threads, which stall where there are more workers than processors.
         rows = max(_PIECE // len(across), 1)
         for top in range(0, len(down), rows):
-            piece = slice(top, top + rows)
-            cv2.merge([reflected[piece] @ across.T, covered[piece, None] * columns], texture[piece])
-        return texture
+            np.matmul(striped[top : top + rows], across.T, out=reflected[top : top + rows])
+        covered, columns = down.sum(axis=1), across.sum(axis=1)
+        inside = min(float(covered.min()), float(columns.min())) >= 1.0 - _UNCOVERED
+        return reflected, None if inside else covered[:, None] * columns
 
 
 def _shares(place: Array, sigma: float) -> NDArray[np.float32]:

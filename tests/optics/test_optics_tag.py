@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from landing_scene import QUIET, STATION, T_WORLD_STATION, above, fixed, landing_camera, platform_scene
+from scipy.special import ndtr
 
 from auvdock.core.landing_station import TagCfg
 from auvdock.core.transforms import invert
@@ -131,6 +132,39 @@ def test_drawing_equals_brute_supersampling():
         assert np.abs(shift).max() < 0.01
 
 
+@pytest.mark.parametrize("place", [(0.75, 0.03, 0.02, 33.0, 5.0, -4.0), (0.5, 0.05, -0.02, -8.0, -3.0, 4.0)])
+def test_a_nearby_tag_equals_the_closed_form_at_every_pixel(place):
+    # As above, but the cells are so large that the blurred pattern is known: a difference of normal distributions at
+    # the place where each pixel's own ray meets the plane, in double precision.
+    nothing = WaterCfg("nothing", "test", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    even = dataclasses.replace(LINEAR, lamp_spill=0.0)
+    unit = landing_camera(even, nothing, None, nuisance=NuisanceCfg(daylight="severe"))
+    assert unit.tag is not None
+    body = above(*place)
+    drawn = tag_only(unit, body)[:, :, 1]
+    grid = np.stack(np.meshgrid(np.arange(800.0), np.arange(600.0)), axis=2).reshape(-1, 2)
+    drawn /= unit.lit.lens.solid_angle_at(grid).reshape(600, 800)
+    to_camera = invert(body @ unit.lit.camera.T_body_camera)
+    plane = to_camera[:3, :3] @ unit.tag.scene.cells_to_world
+    plane[:, 2] += to_camera[:3, 3]
+    cells = np.column_stack([unit.lit.camera.normalise(grid), np.ones(len(grid))]) @ np.linalg.inv(plane).T
+    cells = (cells[:, :2] / cells[:, 2:]).reshape(600, 800, 2)
+    per_px = np.hypot(np.gradient(cells, axis=0), np.gradient(cells, axis=1))
+    edges = np.arange(CELLS + 1.0)
+    sigma = math.sqrt(0.8**2 + 1.0 / 12.0) * per_px
+    u, v = (np.diff(ndtr((edges - cells[:, :, k : k + 1]) / sigma[:, :, k : k + 1]), axis=2) for k in range(2))
+    wanted = np.einsum("yxr,rc,yxc->yx", v, np.where(tag_cells(0), 0.9, 0.09), u)
+    assert (wanted > 0.05).sum() > 60000
+    level = drawn[wanted > 0.88].mean() / wanted[wanted > 0.88].mean()
+    miss = drawn / level - wanted
+    assert np.abs(miss).max() < 0.08
+    assert float(np.sqrt(np.mean(miss**2))) < 0.006
+    down, across = np.gradient(wanted)
+    slopes = np.column_stack([across.ravel(), down.ravel()])
+    # One blur and one texture for the whole tag, from the lens in its middle: that, not the reading, is the miss.
+    assert np.abs(np.linalg.lstsq(slopes, miss.ravel(), rcond=None)[0]).max() < 0.003
+
+
 def test_cells_have_the_light_that_the_scene_says():
     unit = landing_camera(LINEAR, "pool", LampCfg())
     body = above(0.8)
@@ -154,14 +188,24 @@ def test_cells_have_the_light_that_the_scene_says():
 
 def test_texture_covers_the_tag_and_nothing_else():
     pattern = TagPattern(STATION.tag)
-    texture, (first, _) = pattern.texture(0.05, 0.08, 0.08), pattern.texels(0.05, 0.08, 0.08)
-    area = float(texture[:, :, 1].sum()) * 0.05**2
+    (reflected, covered), (first, count) = pattern.texture(0.05, 0.08, 0.08), pattern.texels(0.05, 0.08, 0.08)
+    assert covered is not None
+    area = float(covered.sum()) * 0.05**2
     assert area == pytest.approx(CELLS**2, rel=1e-3)
     assert first < -0.3
-    assert float(texture[:, :, 1].max()) <= 1.0 + 1e-5
-    assert float(np.abs(texture[0]).max()) < 1e-4
+    assert float(covered.max()) <= 1.0 + 1e-5
+    assert max(float(np.abs(reflected[0]).max()), float(np.abs(covered[0]).max())) < 1e-4
     white = float(tag_cells(0).sum()) * 0.9 + float((~tag_cells(0)).sum()) * 0.09
-    assert float(texture[:, :, 0].sum()) * 0.05**2 == pytest.approx(white, rel=1e-3)
+    assert float(reflected.sum()) * 0.05**2 == pytest.approx(white, rel=1e-3)
+    # A window is a part of the whole, and the coverage is left out where it is complete.
+    window = (count // 2, 1, count - 3, count // 3)
+    part, partly = pattern.texture(0.05, 0.08, 0.08, window)
+    assert partly is not None
+    assert part == pytest.approx(reflected[1 : count // 3, count // 2 : count - 3], abs=1e-6)
+    assert partly == pytest.approx(covered[1 : count // 3, count // 2 : count - 3], abs=1e-6)
+    third, half = count // 3, count // 2
+    assert pattern.texture(0.05, 0.08, 0.08, (third, third, half, half))[1] is None
+    assert covered[third:half, third:half] == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(
