@@ -17,6 +17,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.transforms import cross
 from auvdock.optics.beam_pieces import BeamPieces, PieceLight
 from auvdock.optics.lens import Lens
+from auvdock.optics.lights_image import coloured
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.rotating_light import Beam
 from auvdock.optics.water import WaterCfg
@@ -60,7 +61,7 @@ class BeamImage:
             radiance = sharp if radiance is None else np.add(radiance, sharp, dtype=np.float32)
         if radiance is not None:
             radiance *= self._solid_angle
-            image += radiance[:, :, None] * (self._channel * exposure_s).astype(np.float32)
+            image += coloured(radiance, (self._channel * exposure_s).astype(np.float32))
 
     def _blobs(self, beam: Beam, pieces: PieceLight, floor: float) -> NDArray[np.float32] | None:
         """(h, w) radiance of the Gaussians and halos about the pieces."""

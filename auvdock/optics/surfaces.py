@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, BoolArray
 from auvdock.optics.gl import StaticRenderer
 from auvdock.optics.illumination import LAMP_M2, Illumination
 from auvdock.optics.scene import LitScene
@@ -87,19 +87,22 @@ class Surfaces:
     def visible(self, position_world_m: Array, sensitivity_s: float) -> bool:
         """Whether any surface can stand out of the noise, in the most favourable case, from a position (3,)."""
         daylight = self._lit.daylight_w_m2(-float(position_world_m[2]))
-        through = np.exp(-self._geoms.distance_m(position_world_m)[:, None] * self._beta_direct)
+        distance = self._geoms.distance_m(position_world_m)
+        through = np.exp(-distance[:, None] * self._beta_direct)
         irradiance = self._lamp_irradiance + daylight
         if self._lit.lamp is not None:
-            irradiance = irradiance + self._lit.lamp.brightest(self._geoms.distance_m(position_world_m))
-        radiance = irradiance * through * _GREATEST_RADIANCE
-        if len(self._planes):
-            radiance[self._planes] = self._plane_radiance(position_world_m, daylight, through[self._planes])
+            irradiance = irradiance + self._lit.lamp.brightest(distance)
         per_pixel = self._lit.electrons_per_j.T * (sensitivity_s * self._lit.lens.rad_per_px**2)
-        signal = float((radiance @ per_pixel).max(initial=0.0))
         veil = float(self._lit.veil_e_s(-float(position_world_m[2])).max()) * sensitivity_s
-        return signal > math.sqrt(self._lit.cfg.read_noise_e**2 + veil)
+        noise = math.sqrt(self._lit.cfg.read_noise_e**2 + veil)
+        shown: BoolArray = ((irradiance * through * _GREATEST_RADIANCE) @ per_pixel > noise).any(axis=1)
+        doubtful = shown[self._planes].any()
+        if np.count_nonzero(shown) > np.count_nonzero(shown[self._planes]) or not doubtful:
+            return bool(shown.any())
+        radiance = self._plane_radiance(position_world_m, distance, daylight, through[self._planes])
+        return float((radiance @ per_pixel).max()) > noise
 
-    def _plane_radiance(self, position_world_m: Array, daylight: Array, through: Array) -> Array:
+    def _plane_radiance(self, position_world_m: Array, distance: Array, daylight: Array, through: Array) -> Array:
         """(n, 3) upper bound of each plane's radiance through water, tighter than that of its nearest point.
 
         A point at d from a lamp lies D - d from the camera or farther, D being the camera's distance from that lamp, so
@@ -107,7 +110,7 @@ class Surfaces:
         each factor is taken at the end where it is greater; h is the camera's distance from the plane.
         """
         away = np.linalg.norm(self._lamps - position_world_m, axis=1)
-        height = self._geoms.distance_m(position_world_m)[self._planes]
+        height = distance[self._planes]
         bound = np.empty((len(self._planes), 3))
         for row, nearest in enumerate(self._lamp_to_plane):
             share = np.linspace(0.0, 1.0, _BOUND_STEPS + 1)
