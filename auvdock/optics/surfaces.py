@@ -95,7 +95,8 @@ class Surfaces:
         per_pixel = self._lit.electrons_per_j.T * (sensitivity_s * self._lit.lens.rad_per_px**2)
         veil = float(self._lit.veil_e_s(-float(position_world_m[2])).max()) * sensitivity_s
         noise = math.sqrt(self._lit.cfg.read_noise_e**2 + veil)
-        shown: BoolArray = ((irradiance * through * _GREATEST_RADIANCE) @ per_pixel > noise).any(axis=1)
+        brightest: Array = ((irradiance * through * _GREATEST_RADIANCE) @ per_pixel).max(axis=1)
+        shown: BoolArray = np.greater(brightest, noise)
         doubtful = shown[self._planes].any()
         if np.count_nonzero(shown) > np.count_nonzero(shown[self._planes]) or not doubtful:
             return bool(shown.any())
