@@ -100,10 +100,10 @@ class Surfaces:
         doubtful = shown[self._planes].any()
         if np.count_nonzero(shown) > np.count_nonzero(shown[self._planes]) or not doubtful:
             return bool(shown.any())
-        radiance = self._plane_radiance(position_world_m, distance, daylight, through[self._planes])
+        radiance = self._plane_radiance(position_world_m, distance[self._planes], daylight, through[self._planes])
         return float((radiance @ per_pixel).max()) > noise
 
-    def _plane_radiance(self, position_world_m: Array, distance: Array, daylight: Array, through: Array) -> Array:
+    def _plane_radiance(self, position_world_m: Array, height: Array, daylight: Array, through: Array) -> Array:
         """(n, 3) upper bound of each plane's radiance through water, tighter than that of its nearest point.
 
         A point at d from a lamp lies D - d from the camera or farther, D being the camera's distance from that lamp, so
@@ -111,7 +111,6 @@ class Surfaces:
         each factor is taken at the end where it is greater; h is the camera's distance from the plane.
         """
         away = np.linalg.norm(self._lamps - position_world_m, axis=1)
-        height = distance[self._planes]
         bound = np.empty((len(self._planes), 3))
         for row, nearest in enumerate(self._lamp_to_plane):
             share = np.linspace(0.0, 1.0, _BOUND_STEPS + 1)

@@ -34,7 +34,7 @@ def test_no_point_of_the_floor_outshines_the_bound(surfaces, x_m, height_m):
     floor_z = -12.0
     camera = np.array([x_m, 1.0, floor_z + height_m])
     through = np.exp(-height_m * surfaces._beta_direct)[None]
-    bound = surfaces._plane_radiance(camera, np.zeros(3), through)[0]
+    bound = surfaces._plane_radiance(camera, np.array([height_m]), np.zeros(3), through)[0]
     true = brightest_floor(surfaces, camera, floor_z)
     lit = true > 0.0
     assert np.all(bound[lit] >= 0.999 * true[lit])
