@@ -172,7 +172,7 @@ def _detections(image: Image, boxes: list[Array], centres: list[Array], snr: Arr
     # A core is white; the colour is in the halo around it.
     rim = (xyxy[:, 2:] - xyxy[:, :2]).max(axis=1, keepdims=True) + _HALO_PX
     around = np.maximum(np.hstack([xyxy[:, :2] - rim, xyxy[:, 2:] + rim]).round().astype(int), 0)
-    loose = image[::8, ::8]
+    loose = np.ascontiguousarray(image[::8, ::8])
     ground = np.array([_median(loose, channel) for channel in range(3)])
     classes = np.array([_class(image[y0:y1, x0:x1], ground) for x0, y0, x1, y1 in around.tolist()], dtype=np.int64)
     strength = snr[order]
