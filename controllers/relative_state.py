@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from auvdock.controllers.senses import Rows, Senses, Vector, cross, rotate, rotate_back, turn
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, constant
 from auvdock.core.contracts import PoseEstimate
 from auvdock.core.errors import ConfigError
 
@@ -24,6 +24,7 @@ __all__ = ["FilterCfg", "RelativeFilter", "RelativeState"]
 
 Quad = tuple[float, float, float, float]
 _lapack: Any = lapack  # its stub lists no routines
+_HALF = constant(0.5)
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,7 @@ class RelativeFilter:
         self._floor = np.diag([cfg.position_floor_m**2] * 3 + [cfg.rotation_floor_rad**2] * 3)
         self._sensitivity = np.zeros((6, 4))
         self._sensitivity[:3, :3] = np.eye(3)
+        self._inflation = constant(cfg.inflation)
         self._max_trace = 1.0 + 2.0 * math.cos(cfg.max_rotation_mismatch_rad)
 
     def predict(self, state: RelativeState, senses: Senses) -> RelativeState:
@@ -131,7 +133,7 @@ class RelativeFilter:
         return RelativeState(
             (x + velocity[0] * dt_s, y + velocity[1] * dt_s, z + velocity[2] * dt_s),
             state.axis_yaw_rad,
-            move @ state.covariance @ move.T + self._process,
+            move.dot(state.covariance).dot(move.T) + self._process,
             state.since_fix_s + dt_s,
             state.fixes,
             state.refused,
@@ -177,8 +179,9 @@ class RelativeFilter:
         T, cov = pose.T_station_camera, pose.covariance
         if not math.isfinite(float(np.vdot(T, T)) + float(np.vdot(cov, cov))):
             return state
-        predicted = np.array(self._R_station_body(state.axis_yaw_rad, senses)).reshape(3, 3) @ self._R_body_camera
-        e: list[float] = (predicted.T @ T[:3, :3]).ravel().tolist()
+        R_station_body = np.array(self._R_station_body(state.axis_yaw_rad, senses)).reshape(3, 3)
+        predicted = R_station_body.dot(self._R_body_camera)
+        e: list[float] = predicted.T.dot(T[:3, :3]).ravel().tolist()
         sine = (0.5 * (e[7] - e[5]), 0.5 * (e[2] - e[6]), 0.5 * (e[3] - e[1]))
         x, y, z = state.camera_m
         px, py, pz = T[:3, 3].tolist()
@@ -186,21 +189,21 @@ class RelativeFilter:
             innovation = np.array([px - x, py - y, pz - z, *sine])
             sensitivity = self._sensitivity.copy()
             np.negative(predicted[2], out=sensitivity[3:, 3])
-            HP = sensitivity @ state.covariance
-            spread = HP @ sensitivity.T
-            spread += cfg.inflation * cov
+            HP = sensitivity.dot(state.covariance)
+            spread = HP.dot(sensitivity.T)
+            spread += self._inflation * cov
             spread += self._floor
             right = np.empty((6, 5), order="F")
             right[:, :4] = HP
             right[:, 4] = innovation
             gain = _solve(spread, right)
-            if float(innovation @ gain[:, 4]) < cfg.gate:
-                dx, dy, dz, turn = (HP.T @ gain[:, 4]).tolist()
-                covariance = state.covariance - HP.T @ gain[:, :4]
+            if float(innovation.dot(gain[:, 4])) < cfg.gate:
+                dx, dy, dz, turn = HP.T.dot(gain[:, 4]).tolist()
+                covariance = state.covariance - HP.T.dot(gain[:, :4])
                 return RelativeState(
                     (x + dx, y + dy, z + dz),
                     math.remainder(state.axis_yaw_rad + turn, math.tau),
-                    0.5 * (covariance + covariance.T),
+                    _HALF * (covariance + covariance.T),
                     0.0,
                     state.fixes + 1,
                     0,
@@ -224,7 +227,7 @@ class RelativeFilter:
         if not (math.isfinite(rx + ry + rz) and rz > 0.2):
             return state
         R_station_body = self._R_station_body(state.axis_yaw_rad, senses)
-        columns = np.array(R_station_body).reshape(3, 3) @ self._R_body_camera
+        columns = np.array(R_station_body).reshape(3, 3).dot(self._R_body_camera)
         c: list[float] = columns.ravel().tolist()
         camera = state.camera_m
         to_target = (target_m[0] - camera[0], target_m[1] - camera[1], target_m[2] - camera[2])

@@ -43,13 +43,12 @@ class GuidanceMetrics:
         """Precompute what stays the same."""
         self._camera = camera
         self._T_station_world = invert(T_world_station)
-        points = station.layout.array_positions_m
-        self._array_station = np.hstack([points, np.ones((len(points), 1))])
-        self._precise = 0
-        self._invalid = 0
-        self._camera_body = camera.T_body_camera[:, 3]
+        self._array_m = station.layout.array_positions_m
+        self._camera_body = camera.T_body_camera[:, 3].copy()
+        # Kept as they are and judged in one go at the end: a frame is cheap, its judgement is not.
         self._true_m: list[Array] = []
         self._measured_m: list[Array] = []
+        self._unmeasured: list[Array] = []
 
     def add(self, truth: Truth, percept: Percept) -> None:
         """Count one frame."""
@@ -57,13 +56,10 @@ class GuidanceMetrics:
         if not self._true_m and not measured:
             return
         if measured and percept.pose is not None:
-            # Kept as they are and compared in one go at the end: this runs in every frame.
-            self._true_m.append(truth.T_world_body @ self._camera_body)
+            self._true_m.append(truth.T_world_body.dot(self._camera_body))
             self._measured_m.append(percept.pose.T_station_camera[:3, 3])
-            self._precise += 1
-        elif self._array_in_view(self._T_station_world @ truth.T_world_body @ self._camera.T_body_camera):
-            self._precise += 1
-            self._invalid += 1
+        else:
+            self._unmeasured.append(truth.T_world_body)
 
     def summary(self) -> GuidanceSummary:
         """The metrics so far."""
@@ -72,15 +68,22 @@ class GuidanceMetrics:
             camera_m = np.array(self._true_m) @ self._T_station_world[:3].T
             entry_m, last_m = float(camera_m[0, 0]), float(camera_m[-1, 0])
             error_m = float(np.median(np.linalg.norm(np.array(self._measured_m) - camera_m, axis=1)))
+        invalid = self._invalid_frames()
+        precise = len(self._true_m) + invalid
         return GuidanceSummary(
-            distortion_rate=self._invalid / self._precise if self._precise else None,
-            precise_frames=self._precise,
-            invalid_frames=self._invalid,
+            distortion_rate=invalid / precise if precise else None,
+            precise_frames=precise,
+            invalid_frames=invalid,
             entry_distance_m=entry_m,
             precise_range_m=None if entry_m is None or last_m is None else entry_m - last_m,
             pose_error_median_m=error_m,
         )
 
-    def _array_in_view(self, T_station_camera: Array) -> bool:
-        points = (self._array_station @ invert(T_station_camera).T)[:, :3]
-        return int(np.count_nonzero(self._camera.in_view(points))) >= self.MIN_IN_VIEW
+    def _invalid_frames(self) -> int:
+        """Frames without a measured pose in which enough of the array lies in view."""
+        if not self._unmeasured:
+            return 0
+        T_station_camera = self._T_station_world @ np.array(self._unmeasured) @ self._camera.T_body_camera
+        points = (self._array_m - T_station_camera[:, None, :3, 3]) @ T_station_camera[:, :3, :3]
+        in_view = self._camera.in_view(points.reshape(-1, 3)).reshape(len(points), -1)
+        return int(np.count_nonzero(np.count_nonzero(in_view, axis=1) >= self.MIN_IN_VIEW))

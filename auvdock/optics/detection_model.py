@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.assets import asset
-from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.arrays import Array, BoolArray, constant
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
@@ -30,6 +30,7 @@ __all__ = [
 ]
 
 _ONES = np.ones(2)
+_ONE, _TEN, _VEILED_DN, _LEAST_DN = constant(1.0), constant(10.0), constant(50.0), constant(1e-3)
 _HAZE_PX = 20.0
 _GHOST_FLUX = 0.3
 """Flux of haze that breaks into spots, over that of the dimmest light (ours)."""
@@ -201,15 +202,15 @@ def draw_detections(
     contrast = merged.contrast_dn
     odds = merged.surround_dn * model.surround_factor
     odds += model.contrast_50_dn
-    odds /= np.maximum(contrast, 1e-3)
+    odds /= np.maximum(contrast, _LEAST_DN)
     odds **= model.slope
     flash, ways = seen.flash, model.flash or _FLASH
     if flash is not None:
         odds[flash.place] = (ways.contrast_50_dn / max(float(contrast[flash.place]), 1e-3)) ** ways.slope
-    odds += 1.0
+    odds += _ONE
     odds *= chance[0]
     hit = odds < model.ceiling
-    hit &= contrast > 1e-3
+    hit &= contrast > _LEAST_DN
     index = hit.nonzero()[0]
     index = index[(-contrast[index]).argsort(kind="stable")]
     strength = contrast[index]
@@ -223,7 +224,7 @@ def draw_detections(
     centre *= np.sqrt(spread, out=spread)[:, None]
     centre += merged.pixels.take(index, 0)
     snr *= model.score_gain
-    score = snr / (snr + 10.0)
+    score = snr / (snr + _TEN)
     class_id = (merged.red[index] != (chance[1, index] < model.wrong_colour)).astype(np.int64)
     half = np.maximum(merged.radius_px[index], width)[:, None]
     if flash is not None and hit[flash.place]:
@@ -257,13 +258,13 @@ def squared_distances(pixels: Array) -> Array:
     """(m, m) squared distances between points (m, 2)."""
     offset = pixels[:, None, :] - pixels
     offset *= offset
-    return offset @ _ONES
+    return offset.dot(_ONES)
 
 
 def veiled_share(seen: Candidates) -> float:
     """Share of lights whose surroundings outshine their contrast by 50 codes or more."""
     m = len(seen.flux)
-    return np.count_nonzero(seen.surround_dn > seen.contrast_dn + 50.0) / m if m else 0.0
+    return np.count_nonzero(seen.surround_dn > seen.contrast_dn + _VEILED_DN) / m if m else 0.0
 
 
 def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:

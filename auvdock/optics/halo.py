@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from auvdock.core.arrays import Array, IntArray
+from auvdock.core.arrays import Array, IntArray, constant
 
 __all__ = ["HaloTable", "halo_table", "wells_transfer"]
 
@@ -26,6 +26,7 @@ _MIN_BR, _MAX_BR = 1e-3, 40.0
 _BINS_PER_UNIT, _BINS = 64, 4096
 _ANGLES = 192
 _MIN_T, _MAX_T = 1e-3, 200.0
+_LOWEST_BR, _HIGHEST_BR = constant(_MIN_BR), constant(0.999 * _MAX_BR)
 
 
 def wells_transfer(br: float, frequency_cycles_rad: Array, theta0_rad: float) -> Array:
@@ -44,8 +45,8 @@ class HaloTable:
         """Scale the universal table to an angle."""
         self.theta0_rad = theta0_rad
         log_br, self._log_t, self._log_density, self._encircled = _universal()
-        self._first = float(log_br[0])
-        self._per_step = 1.0 / float(log_br[1] - log_br[0])
+        self._first = constant(float(log_br[0]))
+        self._per_step = constant(1.0 / float(log_br[1] - log_br[0]))
 
     def density_rows(self, angle_rad: Array) -> Array:
         """(rows, m) halo per steradian at fixed angles (m,), one row per tabulated b r; see `row_of`."""
@@ -60,7 +61,7 @@ class HaloTable:
 
     def row_of(self, br: Array) -> tuple[IntArray, Array]:
         """Row (n,) below each b r (n,) and the weight (n,) of the row above: linear in log b r."""
-        place = np.log(np.minimum(np.maximum(br, _MIN_BR), 0.999 * _MAX_BR))
+        place = np.log(np.minimum(np.maximum(br, _LOWEST_BR), _HIGHEST_BR))
         place -= self._first
         place *= self._per_step
         row = place.astype(np.int64)

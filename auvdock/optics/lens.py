@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.arrays import Array, BoolArray, constant
 from auvdock.core.camera import Camera
 from auvdock.optics.settings import ImagingCfg
 
@@ -47,6 +47,8 @@ class Lens:
         corner = camera.normalise(np.array([[-0.5, -0.5], [last_x, last_y], [last_x, -0.5], [-0.5, last_y]]))
         self._max_tangent2 = float(np.max(np.sum(corner**2, axis=1)))
         self.max_tangent = math.sqrt(self._max_tangent2)
+        self._k1 = constant(k1)
+        self._edges = self._edges_at(0.0)
 
     @cached_property
     def rays(self) -> Array:
@@ -96,17 +98,18 @@ class Lens:
         Rays beyond the image's corners (by more than the margin) have no meaningful pixel: the distortion polynomial
         folds back there.
         """
-        xy = rays[:, :2] / np.maximum(rays[:, 2:], 1e-9)
+        limit, reach = self._edges if margin_px == 0.0 else self._edges_at(margin_px)
+        xy = rays[:, :2] / np.maximum(rays[:, 2:], _NO_DEPTH)
         x2y2 = xy * xy
         r2 = x2y2[:, 0] + x2y2[:, 1]
-        limit = self._max_tangent2 * (1.0 + margin_px * self.rad_per_px) ** 2
-        inside = (r2 <= limit) & (rays[:, 2] > 0.0)
+        inside = r2 <= limit
+        inside &= rays[:, 2] > _ZERO
         np.minimum(r2, limit, out=r2)
         if self._radial is not None:
             # `Camera.project` without its tangential terms, at a third of its cost for a handful of points.
             k1, k2, k3 = self._radial
-            radial = r2 * k1 if self._only_k1 else r2 * (k1 + r2 * (k2 + r2 * k3))
-            radial += 1.0
+            radial = r2 * self._k1 if self._only_k1 else r2 * (k1 + r2 * (k2 + r2 * k3))
+            radial += _ONE
             pixels = radial[:, None] * self._focal
             pixels *= xy
             pixels += self._centre
@@ -114,12 +117,19 @@ class Lens:
             pixels = self.camera.project(np.where(inside[:, None], rays, _AHEAD))
         offset = pixels - self._middle
         np.abs(offset, out=offset)
-        inside &= offset[:, 0] < self._middle[0] + (0.5 + margin_px)
-        inside &= offset[:, 1] < self._middle[1] + (0.5 + margin_px)
+        within = offset < reach
+        inside &= within[:, 0]
+        inside &= within[:, 1]
         return pixels, inside
+
+    def _edges_at(self, margin_px: float) -> tuple[Array, Array]:
+        """Greatest squared tangent to the optical axis () and offset from the image's middle (2,), with a margin."""
+        limit = self._max_tangent2 * (1.0 + margin_px * self.rad_per_px) ** 2
+        return constant(limit), self._middle + (0.5 + margin_px)
 
 
 _AHEAD = np.array([0.0, 0.0, 1.0])
+_ZERO, _ONE, _NO_DEPTH = constant(0.0), constant(1.0), constant(1e-9)
 
 
 def _coarse_factor(width_px: int) -> int:

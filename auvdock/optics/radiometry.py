@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, constant
 from auvdock.core.beacons import BeaconCfg, BeaconLayout
 from auvdock.optics.bands import electrons_per_joule
 from auvdock.optics.light import peak_intensity_w_sr
@@ -20,6 +20,7 @@ from auvdock.optics.water import WaterCfg
 __all__ = ["LightSet", "Received"]
 
 _ONES = np.ones(3)
+_ONE, _MINUS_ONE, _NEAREST_M2 = constant(1.0), constant(-1.0), constant(1e-4)
 
 
 class Received(NamedTuple):
@@ -95,13 +96,14 @@ class LightSet:
         """Core and halo irradiance of every lamp at a camera pose (4, 4)."""
         camera = T_station_camera[:3, 3]
         offset = self.positions_m - camera
-        r2 = (offset * offset) @ _ONES
-        np.maximum(r2, 1e-4, out=r2)
+        r2 = (offset * offset).dot(_ONES)
+        np.maximum(r2, _NEAREST_M2, out=r2)
         r = np.sqrt(r2)
         ray = offset / r[:, None]
-        cosine = (ray * self._back) @ _ONES
-        np.maximum(cosine, -1.0, out=cosine)
-        angle = np.arccos(np.minimum(cosine, 1.0, out=cosine))
+        cosine = (ray * self._back).dot(_ONES)
+        np.maximum(cosine, _MINUS_ONE, out=cosine)
+        np.minimum(cosine, _ONE, out=cosine)
+        angle = np.arccos(cosine, out=cosine)
         exponent = self._minus_profile * angle
         exponent *= angle
         exponent -= self.absorption_per_m * r
@@ -118,4 +120,4 @@ class LightSet:
                     total[index] = 0.0
         depth = self.scattering_per_m * r
         core = total * np.exp(-depth)
-        return Received(ray @ T_station_camera[:3, :3], r, depth, core, total - core)
+        return Received(ray.dot(T_station_camera[:3, :3]), r, depth, core, total - core)

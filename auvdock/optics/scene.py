@@ -154,8 +154,8 @@ class LitScene:
             station_time_s: the same by the station's clock, which turns the rotating beacon; None: the two agree.
             exposure_s: time over which the rotating beacon's light is averaged.
         """
-        T_world_camera = T_world_body @ self.camera.T_body_camera
-        T_station_camera = self._T_station_world @ T_world_camera
+        T_world_camera = T_world_body.dot(self.camera.T_body_camera)
+        T_station_camera = self._T_station_world.dot(T_world_camera)
         received = self.lights.received(T_station_camera)
         if len(self.dead):
             received.core_w_m2[self._unlit] = 0.0

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, constant
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Detections
@@ -30,6 +30,9 @@ from auvdock.optics.spots import Spots
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeaconSensor", "candidates_in_view"]
+
+_GREATEST_CODE, _PER_PI = constant(255.0), constant(1.0 / math.pi)
+_RED_CHANNEL = np.array(0)
 
 
 class BeaconSensor:
@@ -136,18 +139,18 @@ def candidates_in_view(
     bright = np.add(around, own, out=electrons[0])
     electrons[1] = around
     codes = scale.codes(electrons)
-    np.minimum(codes, 255.0, out=codes)
+    np.minimum(codes, _GREATEST_CODE, out=codes)
     contrast = codes[0] - codes[1]
     seen = Candidates(
         pixels,
         contrast,
         codes[1],
         scale.noise_dn(bright),
-        np.sqrt(np.maximum.reduce(area, axis=1) * (1.0 / math.pi)),
+        np.sqrt(np.maximum.reduce(area, axis=1) * _PER_PI),
         spots.sigma_px,
         own,
         gap2,
-        best == 0,
+        best == _RED_CHANNEL,
     )
     if view.beam is not None:
         seen = with_flash(lit, spots, seen, scale, exposure_s, flash_model or FlashModelCfg())

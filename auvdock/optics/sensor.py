@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from auvdock.core.arrays import Array, Image
+from auvdock.core.arrays import Array, Image, constant
 from auvdock.core.response import SATURATED_CODE
 from auvdock.optics.settings import ImagingCfg
 
@@ -42,14 +42,17 @@ class SensorScale:
             self.saturated_e = SATURATED_CODE * self.full_scale_e / 255.0
         else:
             self.saturated_e = (SATURATED_CODE / self.dn_per_root + self.read_e) ** 2 - self._read2
+        self._codes = constant(self._read2), constant(self.read_e), constant(self.dn_per_root)
 
     def codes(self, electrons: Array) -> Array:
         """Unrounded, unclipped codes of electrons, any shape."""
         if self._linear:
             return electrons * (255.0 / self.full_scale_e)
-        root = np.sqrt(electrons + self._read2)
-        root -= self.read_e
-        root *= self.dn_per_root
+        read2, read, dn_per_root = self._codes
+        root = electrons + read2
+        np.sqrt(root, out=root)
+        root -= read
+        root *= dn_per_root
         return root
 
     def electrons(self, codes: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.core.arrays import Array, IntArray
+from auvdock.core.arrays import Array, IntArray, constant
 from auvdock.optics.halo import halo_table
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet, Received
@@ -17,7 +17,9 @@ from auvdock.optics.water import WaterCfg
 __all__ = ["FlashLines", "SpotModel", "Spots"]
 
 _RADII = 32
-_TWO_PI = 2.0 * math.pi
+_TWO_PI = constant(2.0 * math.pi)
+_ZERO, _HALF, _ONE, _TWO = constant(0.0), constant(0.5), constant(1.0), constant(2.0)
+_LAST = np.array(_RADII - 1)
 
 
 class FlashLines(NamedTuple):
@@ -69,15 +71,16 @@ class SpotModel:
         edges = np.concatenate([[0.0], np.sqrt(self.radii_px[1:] * self.radii_px[:-1]), self.radii_px[-1:]])
         self.ring_px2 = math.pi * np.diff(edges**2)
         self._minus_half_r2 = -0.5 * self.radii_px**2
-        self._first2 = float(self.radii_px[0]) ** 2
-        self._log_first2 = math.log(self._first2)
-        self._per_log2 = 0.5 / math.log(self.radii_px[1] / self.radii_px[0])
+        first2 = float(self.radii_px[0]) ** 2
+        self._first2, self._log_first2 = constant(first2), constant(math.log(first2))
+        self._per_log2 = constant(0.5 / math.log(self.radii_px[1] / self.radii_px[0]))
         self._starts = np.arange(0, lights.count * _RADII, _RADII)
         table = halo_table(water.scattering_angle_rad)
         self._table = table
         self._rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
-        self._lens_sigma2 = cfg.lens_sigma_px**2
-        self._lamp_px_m2 = (cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2
+        self._rises = np.diff(self._rows, axis=0)
+        self._lens_sigma2 = constant(cfg.lens_sigma_px**2)
+        self._lamp_px_m2 = constant((cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2)
         self._channel = lights.electrons_per_j * lens.aperture_m2
         self._samples = lens.camera.width_px * lens.camera.height_px * 3
 
@@ -91,12 +94,9 @@ class SpotModel:
         sigma2 = self._lamp_px_m2 / (range_m * range_m)
         sigma2 += self._lens_sigma2
         row, weight = self._table.row_of(received.scattering_depth[index])
-        lower = self._rows.take(row, 0)
-        row += 1
-        profile = self._rows.take(row, 0)
-        profile -= lower
+        profile = self._rises.take(row, 0)
         profile *= weight[:, None]
-        profile += lower
+        profile += self._rows.take(row, 0)
         profile *= halo[:, None]
         gauss = self._minus_half_r2 / sigma2[:, None]
         np.exp(gauss, out=gauss)
@@ -107,9 +107,9 @@ class SpotModel:
     def saturated_area_px2(self, spots: Spots, level_e_s: float) -> Array:
         """(m, 3) area of each spot above a level in electrons per second, per channel; overlap is not counted."""
         level = spots.profile[:, None, :] * (spots.channel * (2.5 / level_e_s))[:, :, None]
-        level -= 2.0
-        np.maximum(level, 0.0, out=level)
-        np.minimum(level, 1.0, out=level)
+        level -= _TWO
+        np.maximum(level, _ZERO, out=level)
+        np.minimum(level, _ONE, out=level)
         return level @ self.ring_px2
 
     def share(self, area_px2: Array) -> float:
@@ -124,8 +124,8 @@ class SpotModel:
         place = np.log(np.maximum(distance2_px2, self._first2))
         place -= self._log_first2
         place *= self._per_log2
-        place += 0.5
+        place += _HALF
         index = place.astype(np.int64)
-        np.minimum(index, _RADII - 1, out=index)
+        np.minimum(index, _LAST, out=index)
         index += self._starts[: len(index)]
         return spots.profile.take(index)

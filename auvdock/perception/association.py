@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Detections, PoseEstimate
@@ -13,8 +12,7 @@ from auvdock.perception.tracker import LightTracker
 __all__ = ["Associated", "Association", "pose_estimate"]
 
 
-@dataclass(frozen=True, eq=False)
-class Associated:
+class Associated(NamedTuple):
     """Outcome of one frame.
 
     Attributes:

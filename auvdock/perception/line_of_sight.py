@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,8 +42,7 @@ class LineOfSightCfg:
             raise ConfigError("line_of_sight.loyalty", self.loyalty, "a fraction above 0 and up to 1")
 
 
-@dataclass(frozen=True)
-class _Light:
+class _Light(NamedTuple):
     u: float
     v: float
     weight: float
@@ -122,8 +122,9 @@ class LineOfSight:
         return self._bearing(u, v, score, range_m)
 
     def _array_centre(self, solution: PnpSolution) -> Bearing:
-        centre = solution.rotation @ self._centre_m + solution.translation_m
-        range_m = math.sqrt(float(centre @ centre))
+        centre = solution.rotation.dot(self._centre_m)
+        centre += solution.translation_m
+        range_m = math.sqrt(float(centre.dot(centre)))
         x, y, z = centre.tolist()
         return Bearing(centre / range_m, self._map.pixel(x / z, y / z), 1.0, range_m)
 

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import get_lapack_funcs
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, constant
 from auvdock.core.camera import Camera
 from auvdock.core.errors import ConfigError
 
@@ -28,7 +28,8 @@ _posv, _potrf, _potrs = get_lapack_funcs(("posv", "potrf", "potrs"), dtype=np.fl
 _MAX_ITERATIONS = 20
 _DECREMENT = 1e-9
 _DECREMENT_TRACKED = 1e-4
-_IDENTITY = np.eye(6)
+_IDENTITY, _EYE_3 = np.eye(6), np.eye(3)
+_HALF, _ONE = constant(0.5), constant(1.0)
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,7 @@ class PnpCfg:
             raise ConfigError("pnp.attitude_prior_sigma_deg", self.attitude_prior_sigma_deg, "0 or more")
 
 
-@dataclass(frozen=True, eq=False)
-class PnpSolution:
+class PnpSolution(NamedTuple):
     """A pose of the station in the camera frame, p_camera = R p_station + t.
 
     Attributes:
@@ -86,7 +86,7 @@ class PnpSolution:
         transform[3, 3] = 1.0
         back = self.rotation.T
         transform[:3, :3] = back
-        transform[:3, 3] = -back @ self.translation_m
+        transform[:3, 3] = -back.dot(self.translation_m)
         return transform
 
     def covariance(self) -> Array:
@@ -100,15 +100,12 @@ class PnpSolution:
         skew = np.array((0.0, -z, y, z, 0.0, -x, -y, x, 0.0)).reshape(3, 3)
         to = np.zeros((6, 6))
         back = -self.rotation.T
-        to[:3, :3] = back @ skew @ left
+        to[:3, :3] = back.dot(skew).dot(left)
         to[:3, 3:] = back
         np.negative(left, out=to[3:, :3])
         half, _ = _potrs(self.normal, to.T, lower=1)
-        covariance = to @ half
-        return 0.5 * (covariance + covariance.T)
-
-
-_EYE_3 = np.eye(3)
+        covariance = to.dot(half)
+        return _HALF * (covariance + covariance.T)
 
 
 class PnpSolver:
@@ -213,30 +210,31 @@ class PnpSolver:
             pose, decrement = np.concatenate([start.rotation_vector, start.translation_m]), _DECREMENT_TRACKED
         else:
             pose, decrement = np.concatenate(start), _DECREMENT
-        weight = (1.0 / sigma).repeat(2)
+        weight = (_ONE / sigma).repeat(2)
         column = weight[:, None]
         target = pixels.reshape(-1)
-        prior_vector, prior_matrix = self._prior_terms(prior) if self._prior_weight else (np.zeros(3), np.zeros((3, 3)))
+        attitude = self._prior_terms(prior) if self._prior_weight else None
         damping, cost, trial, factor = 0.0, math.inf, pose, _IDENTITY
-        normal, gradient, residual, pull = _IDENTITY, np.zeros(6), target, np.zeros(3)
+        normal, gradient, residual, pull = _IDENTITY, pose, target, None
         for _ in range(_MAX_ITERATIONS):
             image, jacobian = cv2.projectPoints(points, trial[:3], trial[3:], self._matrix, self._distortion)
             difference = image.reshape(-1) - target
             weighted = weight * difference
-            trial_cost = float(weighted @ weighted)
-            if self._prior_weight:
-                offset = trial[:3] - prior_vector
-                pull = prior_matrix @ offset
-                trial_cost += float(offset @ pull)
+            trial_cost = float(weighted.dot(weighted))
+            if attitude is not None:
+                offset = trial[:3] - attitude[0]
+                pull = attitude[1].dot(offset)
+                trial_cost += float(offset.dot(pull))
             if not math.isfinite(trial_cost):
                 return None
             if trial_cost <= cost:
                 pose, cost, residual, damping = trial, trial_cost, difference, damping * 0.1
                 scaled = column * jacobian[:, :6]
-                normal, gradient = scaled.T @ scaled, scaled.T @ weighted
-                if self._prior_weight:
-                    normal[:3, :3] += prior_matrix
-                    gradient[:3] += pull
+                normal, gradient = scaled.T.dot(scaled), scaled.T.dot(weighted)
+                if attitude is not None and pull is not None:
+                    turning, torque = normal[:3, :3], gradient[:3]
+                    turning += attitude[1]
+                    torque += pull
             else:
                 damping = max(10.0 * damping, 1e-3)
             damped = normal + np.diag(damping * normal.diagonal()) if damping > 1e-9 else normal
@@ -246,7 +244,7 @@ class PnpSolver:
                 continue
             trial = pose - step
             # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
-            if float(gradient @ step) < decrement and damping <= 1e-9:
+            if float(gradient.dot(step)) < decrement and damping <= 1e-9:
                 pose = trial
                 break  # undamped, so the factor is that of the normal matrix itself
         else:

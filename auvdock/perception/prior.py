@@ -33,7 +33,7 @@ class AttitudePrior:
         """(3, 3) R_camera_station, for the surveyed heading or another."""
         roll, pitch, yaw = proprioception.euler_zyx_rad.tolist()
         station = self._world_station if station_yaw_rad is None else _turn(station_yaw_rad)
-        return self._camera_body @ rotation_from_euler_zyx(roll, pitch, yaw).T @ station
+        return self._camera_body.dot(rotation_from_euler_zyx(roll, pitch, yaw).T).dot(station)
 
 
 class FacingHeading:

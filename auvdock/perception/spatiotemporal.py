@@ -20,6 +20,7 @@ _MAX_POSE_AGE = 10
 _MIN_LIT = 3
 _REACQUIRE = 0.15
 _REACQUIRE_PX = 2.0
+_FIRST = np.array(0)
 
 
 class SpatiotemporalAssociation:
@@ -90,11 +91,11 @@ class SpatiotemporalAssociation:
 
     def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Array) -> Associated | None:
         """Pose from the tracks that carry an identity; clears all identities and returns None if it does not hold."""
-        rows = (tracks.beacon_id >= 0).nonzero()[0]
+        rows = (tracks.beacon_id >= _FIRST).nonzero()[0]
         if len(rows) == 0:
             return None
-        rows = rows[tracks.beacon_id[rows].argsort()]
-        seen = rows[tracks.detection[rows] >= 0]
+        rows = rows.take(tracks.beacon_id.take(rows).argsort())
+        seen = rows[tracks.detection.take(rows) >= _FIRST]
         if len(seen) >= 4:
             rows = seen
         enough = len(rows) >= 4 or (len(seen) == _MIN_LIT and self._last is not None)
@@ -109,15 +110,15 @@ class SpatiotemporalAssociation:
             tracks.beacon_id[:] = -1
             return None
         count = min(len(seen), len(rows)) if len(seen) >= 4 else len(seen)
-        ids = tuple(tracks.beacon_id[rows].tolist())
+        ids = tuple(tracks.beacon_id.take(rows).tolist())
         return Associated(pose_estimate(solution, ids, error, count >= _MIN_LIT), count, solution)
 
     def _verified(
         self, tracks: LightTracker, detections: Detections, rows: IntArray, prior: Array
     ) -> tuple[PnpSolution | None, float]:
         """The pose of the given tracks if it reprojects well, and its mean reprojection error."""
-        detection = tracks.detection[rows]
-        seen = detection >= 0
+        detection = tracks.detection.take(rows)
+        seen = detection >= _FIRST
         count = np.count_nonzero(seen)
         if count == len(rows):
             pixels = detections.centre_px.take(detection, 0)
@@ -126,7 +127,7 @@ class SpatiotemporalAssociation:
             pixels = tracks.state[rows, :2].copy()
             pixels[seen] = detections.centre_px[detection[seen]]
             sigma = np.where(seen, self._sigma_px, self._sigma_px + np.sqrt(tracks.covariance[rows, 0]))
-        points = self._array_m.take(tracks.beacon_id[rows], 0)
+        points = self._array_m.take(tracks.beacon_id.take(rows), 0)
         solution = self._solver.solve(points, pixels, sigma, prior, self._last)
         if solution is None:
             return None, 0.0

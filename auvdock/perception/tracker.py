@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from auvdock.core.arrays import Array, BoolArray, IntArray
+from auvdock.core.arrays import Array, BoolArray, IntArray, constant
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.perception.views import TrackViews
@@ -20,6 +20,7 @@ __all__ = ["LightTracker", "TrackerCfg"]
 
 _UNMATCHED_COST = 40.0
 _NONE = np.zeros(0, dtype=np.int64)
+_LEAST_SCORE, _ONE, _TWO = constant(0.1), constant(1.0), constant(2.0)
 
 
 @dataclass(frozen=True)
@@ -78,11 +79,11 @@ class LightTracker:
     def __init__(self, cfg: TrackerCfg, rate_hz: float, width_px: int, height_px: int) -> None:
         """Precompute the filter's constants for a camera's rate and size."""
         self._cfg = cfg
-        self._dt = 1.0 / rate_hz
-        dt, power = self._dt, cfg.acceleration_px_s2**2
-        self._q = (0.25 * dt**4 * power, 0.5 * dt**3 * power, dt**2 * power)
-        self._gate = cfg.gate_sigmas**2
-        self._variance = cfg.pixel_sigma_px**2
+        dt, power = 1.0 / rate_hz, cfg.acceleration_px_s2**2
+        self._dt = constant(dt)
+        self._q = constant(0.25 * dt**4 * power), constant(0.5 * dt**3 * power), constant(dt**2 * power)
+        self._gate = constant(cfg.gate_sigmas**2)
+        self._variance = constant(cfg.pixel_sigma_px**2)
         margin = 0.1
         self._low = np.array([-margin * width_px, -margin * height_px])
         self._high = np.array([(1.0 + margin) * width_px, (1.0 + margin) * height_px])
@@ -107,7 +108,7 @@ class LightTracker:
         cfg = self._cfg
         self._slot = (self._slot + 1) % cfg.window_frames
         n, m = len(self.state), len(detections)
-        variance = self._variance / (detections.score + 0.1)
+        variance = self._variance / (detections.score + _LEAST_SCORE)
         paired: IntArray = _NONE
         if n:
             self._predict()
@@ -116,16 +117,17 @@ class LightTracker:
             if m:
                 rows, paired = self._assign(detections, variance)
                 matched[rows] = paired
-            hit = matched >= 0
-            self.missed += 1
-            self.hits += hit
             if len(paired) == n:
                 self._correct(matched, None, detections, variance)
+                self.hits += 1
                 self.missed.fill(0)
-                self.history[:, self._slot] = detections.score[matched]
+                self.history[:, self._slot] = detections.score.take(matched)
             else:
+                hit = matched >= 0
                 if m:
                     self._correct(matched, hit, detections, variance)
+                self.hits += hit
+                self.missed += 1
                 self.missed[hit] = 0
                 self.history[:, self._slot] = np.where(hit, detections.score[matched], 0.0) if m else 0.0
                 self._bury()
@@ -159,7 +161,7 @@ class LightTracker:
         place = self.state[:, :2]
         place += dt * self.state[:, 2:]
         moved = dt * p11
-        spread = 2.0 * p01
+        spread = _TWO * p01
         spread += moved
         spread *= dt
         spread += q00
@@ -188,21 +190,17 @@ class LightTracker:
     def _correct(self, matched: IntArray, hit: BoolArray | None, detections: Detections, variance: Array) -> None:
         """Kalman correction of the tracks `hit`, all if None."""
         p00, p01, p11 = self.covariance.T
-        spread = variance[matched]
+        spread = variance.take(matched)
         spread += p00
-        gain = np.empty((2, len(spread), 1))
-        gain_0, gain_1 = gain[:, :, 0]
-        inverse = np.divide(1.0 if hit is None else hit, spread, out=spread)
-        np.multiply(p00, inverse, out=gain_0)
-        np.multiply(p01, inverse, out=gain_1)
+        inverse = np.divide(_ONE if hit is None else hit, spread, out=spread)
+        gain_0, gain_1 = p00 * inverse, p01 * inverse
         place, speed = self.state[:, :2], self.state[:, 2:]
         innovation = detections.centre_px.take(matched, 0)
         innovation -= place
-        correction = gain * innovation
-        place += correction[0]
-        speed += correction[1]
+        place += gain_0[:, None] * innovation
+        speed += gain_1[:, None] * innovation
         p11 -= gain_1 * p01
-        rest = 1.0 - gain_0
+        rest = np.subtract(_ONE, gain_0, out=gain_0)
         p01 *= rest
         p00 *= rest
 

@@ -28,11 +28,16 @@ class Actuators:
         self.count = len(actuators)
         self.is_fin = [actuator.kind == "fin" for actuator in actuators]
         self.thrusters = [index for index, fin in enumerate(self.is_fin) if not fin]
-        self._gain = [1.0 - math.exp(-dt_s / actuator.time_constant_s) for actuator in actuators]
-        self._dead_band = [actuator.dead_band for actuator in actuators]
-        self._max_force_n = [actuators[index].max_force_n for index in self.thrusters]
-        area = [0.25 * math.pi * actuators[index].disc_diameter_m ** 2 for index in self.thrusters]
-        self._two_over_rho_area = [2.0 / (_RHO_KG_M3 * a) for a in area]
+        # For each actuator: index, gain of the step, dead band.
+        self._lags = [
+            (index, 1.0 - math.exp(-dt_s / actuator.time_constant_s), actuator.dead_band)
+            for index, actuator in enumerate(actuators)
+        ]
+        area = {index: 0.25 * math.pi * actuators[index].disc_diameter_m ** 2 for index in self.thrusters}
+        # For each thruster: index, greatest force, 2 / (ρ A).
+        self._discs = [
+            (index, actuators[index].max_force_n, 2.0 / (_RHO_KG_M3 * area[index])) for index in self.thrusters
+        ]
         self.reset()
 
     def reset(self) -> None:
@@ -45,12 +50,12 @@ class Actuators:
         Raises:
             ValueError: wrong length, or a command that is not a number.
         """
-        values: list[float] = command.tolist() if isinstance(command, np.ndarray) else list(command)
+        values: Sequence[float] = command.tolist() if isinstance(command, np.ndarray) else command
         if len(values) != self.count:
             raise ValueError(f"command has {len(values)} values, expected {self.count}")
         state = self.state
-        for index, value in enumerate(values):
-            if -self._dead_band[index] < value < self._dead_band[index]:
+        for value, (index, gain, band) in zip(values, self._lags, strict=True):
+            if -band < value < band:
                 value = 0.0
             elif value > 1.0:
                 value = 1.0
@@ -58,7 +63,7 @@ class Actuators:
                 value = -1.0
             elif value != value:
                 raise ValueError(f"command {index} is not a number")
-            state[index] += self._gain[index] * (value - state[index])
+            state[index] += gain * (value - state[index])
         return state
 
     def power_w(self, advance_m_s: Sequence[float]) -> float:
@@ -67,11 +72,13 @@ class Actuators:
         Actuator-disc theory (Rankine and Froude): P = ½ |T| (V + √(V² + 2 |T| / (ρ A))) with V
         the advance speed in the direction of the thrust; so a hovering thruster costs power too.
         """
-        power = 0.0
-        for slot, index in enumerate(self.thrusters):
-            x = self.state[index]
-            if x != 0.0:
-                speed = advance_m_s[slot] if x > 0.0 else -advance_m_s[slot]
-                thrust = abs(x) * self._max_force_n[slot]
-                power += 0.5 * thrust * (speed + math.sqrt(speed * speed + self._two_over_rho_area[slot] * thrust))
+        power, state = 0.0, self.state
+        for speed, (index, max_force_n, two_over_rho_area) in zip(advance_m_s, self._discs, strict=True):
+            x = state[index]
+            if x == 0.0:
+                continue
+            if x < 0.0:
+                x, speed = -x, -speed
+            thrust = x * max_force_n
+            power += 0.5 * thrust * (speed + math.sqrt(speed * speed + two_over_rho_area * thrust))
         return power

@@ -56,7 +56,8 @@ class Hydrodynamics:
             thrust = float(np.linalg.norm(column[:3]))
             weights[12 + slot, :6] = column / thrust if thrust > 0.0 else 0.0
         self._weights = weights
-        self._is_fin = [actuator.kind == "fin" for actuator in vehicle.actuators]
+        self._fins = [21 + index for index, actuator in enumerate(vehicle.actuators) if actuator.kind == "fin"]
+        """Their places in z."""
         self._buoyancy_n = vehicle.buoyancy_n
         self._added = added
         self._frame = np.eye(6)
@@ -104,17 +105,19 @@ class Hydrodynamics:
         w = r02 * vx + r12 * vy + r22 * vz
         s = abs(u)
         uu = u * s
-        z = [u, v, w, p, q, r, uu, v * abs(v), w * abs(w), p * abs(p), q * abs(q), r * abs(r), uu, s * v, s * w, s * p]
-        z += (
-            s * q,
-            s * r,
+        z = [
+            *(u, v, w, p, q, r),
+            *(uu, v * abs(v), w * abs(w), p * abs(p), q * abs(q), r * abs(r)),
+            *(uu, s * v, s * w, s * p, s * q, s * r),
             q * w - r * v + r00 * gx + r10 * gy,
             r * u - p * w + r01 * gx + r11 * gy,
             p * v - q * u + r02 * gx + r12 * gy,
-        )
-        z += [uu * x if fin else x for x, fin in zip(actuators, self._is_fin, strict=True)]
+            *actuators,
+        ]
+        for place in self._fins:
+            z[place] *= uu
         out: list[float] = self._weights.dot(np.array(z)).tolist()
-        fx, fy, fz, k, m, n, px, py, pz, hx, hy, hz = out[:12]
+        fx, fy, fz, k, m, n, px, py, pz, hx, hy, hz, *advance = out
         # −C_A(ν_r) ν_r = (p × ω, p × v + h × ω) with the added momenta p, h (Fossen 2011, equation 6.43).
         fx += py * r - pz * q
         fy += pz * p - px * r
@@ -130,4 +133,4 @@ class Hydrodynamics:
             k,
             m,
             n,
-        ], out[12:]
+        ], advance

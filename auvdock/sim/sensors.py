@@ -95,20 +95,20 @@ class Sensors:
         nu: list[float] = nu_body.tolist()
         relative: list[float] = nu_relative_body.tolist()
         scale = self._scale
-        readings = [
-            (roll + error[1], pitch + error[2], math.remainder(yaw + error[3] + self._datum_rad, 2.0 * math.pi)),
-            (nu[3] + error[4], nu[4] + error[5], nu[5] + error[6]),
-            (scale * nu[0] + error[7], scale * nu[1] + error[8], scale * nu[2] + error[9]),
-            (scale * relative[0] + error[10], scale * relative[1] + error[11], scale * relative[2] + error[12]),
-        ]
-        euler, gyro, ground, water = np.array(readings)
+        readings = (
+            *(roll + error[1], pitch + error[2], math.remainder(yaw + error[3] + self._datum_rad, 2.0 * math.pi)),
+            *(nu[3] + error[4], nu[4] + error[5], nu[5] + error[6]),
+            *(scale * nu[0] + error[7], scale * nu[1] + error[8], scale * nu[2] + error[9]),
+            *(scale * relative[0] + error[10], scale * relative[1] + error[11], scale * relative[2] + error[12]),
+        )
+        samples = np.array(readings)
         return Proprioception(
             time_s=time_s,
             depth_m=depth_m + error[0],
-            euler_zyx_rad=euler,
-            angular_velocity_rad_s=gyro,
-            velocity_ground_m_s=ground,
-            velocity_water_m_s=water,
+            euler_zyx_rad=samples[0:3],
+            angular_velocity_rad_s=samples[3:6],
+            velocity_ground_m_s=samples[6:9],
+            velocity_water_m_s=samples[9:12],
             contact=switch_force_n > self._cfg.contact_threshold_n,
             latched=latched,
         )

@@ -222,7 +222,7 @@ class Simulator:
         )
         self._mass += self._hydrodynamics.added_mass_rows(rotation)
         mujoco.mj_factorM(model, data)
-        self._applied[:] = wrench
+        self._applied[...] = wrench
         mujoco.mj_step2(model, data)
         self._poses_stale = True
         self._steps += 1
@@ -246,7 +246,8 @@ class Simulator:
         entry = dock.entry
         pose, nose = np.zeros((4, 4)), np.array(dock.nose_station_m)
         pose[:3, :3], pose[:3, 3], pose[3, 3] = rotation, self._qpos[:3], 1.0
-        pose.flags.writeable = nose.flags.writeable = False
+        pose.setflags(write=False)
+        nose.setflags(write=False)
         self._truth = Truth(
             time_s=self.time_s,
             T_world_body=pose,
@@ -293,12 +294,12 @@ class Simulator:
         water = np.array(self._ocean.velocity(qpos[2]))
         velocity, spin = self._qvel[:3], self._qvel[3:6]
         nu, nu_relative = np.empty(6), np.empty(6)
-        nu[:3] = velocity @ rotation
-        nu_relative[:3] = (velocity - water) @ rotation
+        nu[:3] = velocity.dot(rotation)
+        nu_relative[:3] = (velocity - water).dot(rotation)
         nu[3:] = nu_relative[3:] = spin
         motion = rotation, nu, nu_relative, water
         for array in motion:
-            array.flags.writeable = False
+            array.setflags(write=False)
         self._motion_now = motion
         return motion
 
