@@ -200,10 +200,13 @@ class RelativeFilter:
             if float(innovation.dot(gain[:, 4])) < cfg.gate:
                 dx, dy, dz, turn = HP.T.dot(gain[:, 4]).tolist()
                 covariance = state.covariance - HP.T.dot(gain[:, :4])
+                symmetric = covariance.T.copy()
+                symmetric += covariance
+                symmetric *= _HALF
                 return RelativeState(
                     (x + dx, y + dy, z + dz),
                     math.remainder(state.axis_yaw_rad + turn, math.tau),
-                    _HALF * (covariance + covariance.T),
+                    symmetric,
                     0.0,
                     state.fixes + 1,
                     0,
@@ -260,9 +263,10 @@ class RelativeFilter:
                 shift[2] + spread[2] * step,
                 shift[3] + spread[3] * step,
             )
+            x, y, z, w = spread
             lines = [
-                [value - scale * left * right for value, right in zip(line, spread, strict=True)]
-                for line, left in zip(lines, spread, strict=True)
+                [a - scaled * x, b - scaled * y, c - scaled * z, d - scaled * w]
+                for (a, b, c, d), scaled in zip(lines, [scale * left for left in spread], strict=True)
             ]
         return state._replace(
             camera_m=(camera[0] + shift[0], camera[1] + shift[1], camera[2] + shift[2]),

@@ -211,8 +211,8 @@ def draw_detections(
     odds *= chance[0]
     hit = odds < model.ceiling
     hit &= contrast > _LEAST_DN
-    index = hit.nonzero()[0]
-    index = index[(-contrast[index]).argsort(kind="stable")]
+    order = (-contrast).argsort(kind="stable")
+    index = order[hit[order]]
     strength = contrast[index]
     snr = strength / merged.noise_dn[index]
     width = merged.width_px[index]

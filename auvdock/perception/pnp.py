@@ -105,7 +105,10 @@ class PnpSolution(NamedTuple):
         np.negative(left, out=to[3:, :3])
         half, _ = _potrs(self.normal, to.T, lower=1)
         covariance = to.dot(half)
-        return _HALF * (covariance + covariance.T)
+        symmetric = covariance.T.copy()
+        symmetric += covariance
+        symmetric *= _HALF
+        return symmetric
 
 
 class PnpSolver:

@@ -94,8 +94,8 @@ class SpatiotemporalAssociation:
         rows = (tracks.beacon_id >= _FIRST).nonzero()[0]
         if len(rows) == 0:
             return None
-        rows = rows.take(tracks.beacon_id.take(rows).argsort())
-        seen = rows[tracks.detection.take(rows) >= _FIRST]
+        rows = rows[tracks.beacon_id[rows].argsort()]
+        seen = rows[tracks.detection[rows] >= _FIRST]
         if len(seen) >= 4:
             rows = seen
         enough = len(rows) >= 4 or (len(seen) == _MIN_LIT and self._last is not None)
@@ -110,14 +110,14 @@ class SpatiotemporalAssociation:
             tracks.beacon_id[:] = -1
             return None
         count = min(len(seen), len(rows)) if len(seen) >= 4 else len(seen)
-        ids = tuple(tracks.beacon_id.take(rows).tolist())
+        ids = tuple(tracks.beacon_id[rows].tolist())
         return Associated(pose_estimate(solution, ids, error, count >= _MIN_LIT), count, solution)
 
     def _verified(
         self, tracks: LightTracker, detections: Detections, rows: IntArray, prior: Array
     ) -> tuple[PnpSolution | None, float]:
         """The pose of the given tracks if it reprojects well, and its mean reprojection error."""
-        detection = tracks.detection.take(rows)
+        detection = tracks.detection[rows]
         seen = detection >= _FIRST
         count = np.count_nonzero(seen)
         if count == len(rows):
@@ -127,7 +127,7 @@ class SpatiotemporalAssociation:
             pixels = tracks.state[rows, :2].copy()
             pixels[seen] = detections.centre_px[detection[seen]]
             sigma = np.where(seen, self._sigma_px, self._sigma_px + np.sqrt(tracks.covariance[rows, 0]))
-        points = self._array_m.take(tracks.beacon_id.take(rows), 0)
+        points = self._array_m.take(tracks.beacon_id[rows], 0)
         solution = self._solver.solve(points, pixels, sigma, prior, self._last)
         if solution is None:
             return None, 0.0

@@ -121,7 +121,7 @@ class LightTracker:
                 self._correct(matched, None, detections, variance)
                 self.hits += 1
                 self.missed.fill(0)
-                self.history[:, self._slot] = detections.score.take(matched)
+                self.history[:, self._slot] = detections.score[matched]
             else:
                 hit = matched >= 0
                 if m:
@@ -190,7 +190,7 @@ class LightTracker:
     def _correct(self, matched: IntArray, hit: BoolArray | None, detections: Detections, variance: Array) -> None:
         """Kalman correction of the tracks `hit`, all if None."""
         p00, p01, p11 = self.covariance.T
-        spread = variance.take(matched)
+        spread = variance[matched]
         spread += p00
         inverse = np.divide(_ONE if hit is None else hit, spread, out=spread)
         gain_0, gain_1 = p00 * inverse, p01 * inverse
