@@ -85,6 +85,13 @@ def test_the_same_rows_give_the_same_page(campaign):
     assert html_page(campaign, None) == html_page(load(campaign.folder), None)
 
 
+def test_the_page_tells_what_was_varied(tmp_path):
+    cfg = CampaignCfg(
+        episodes=4, axes=(AxisCfg("level", values=(0.0, 2.0)), AxisCfg("flicker", values=("none", "mild")))
+    )
+    assert "Varied: level 0, 2; flicker none, mild." in html_page(made(tmp_path / "out", cfg, 0.5), None)
+
+
 def test_every_cause_of_failure_can_be_drawn(campaign):
     failed = [row for row in campaign.rows if row["success"] is False]
     assert len(failed) >= len(FAILURE_REASONS)

@@ -90,7 +90,7 @@ def _axis_words(campaign: Campaign) -> list[str]:
     words: list[str] = []
     for axis in campaign.cfg.axes:
         if axis.values:
-            words.append(f"{axis.name} {', '.join(map(str, axis.values))}")
+            words.append(f"{axis.name} {', '.join(_value(value) for value in axis.values)}")
         elif axis.is_grid:
             words.append(f"{axis.name} {axis.low:g} to {axis.high:g} ({axis.count} values)")
         else:
