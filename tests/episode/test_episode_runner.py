@@ -142,7 +142,13 @@ def test_interrupt_leaves_a_readable_recording(tmp_path):
         "--record",
         str(path),
     ]
-    process = subprocess.Popen([sys.executable, "-m", "auvdock.cli", *words], stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "auvdock.cli", *words],
+        stderr=subprocess.PIPE,
+        text=True,
+        # Tests that were started in the background inherit that an interrupt is ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     deadline = time.monotonic() + 60.0
     sizes: set[int] = set()
     while time.monotonic() < deadline and len(sizes) < 4:  # the scene first, then a batch every half second
