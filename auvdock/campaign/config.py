@@ -23,6 +23,7 @@ STATIONS: Mapping[str, Callable[[int], AnyEpisodeCfg]] = {
     "landing": landing_level_cfg,
 }
 """Stations that campaigns can dock into, and what an episode of a difficulty level is there."""
+_LEAST_LIMIT_S, _TIMES_SIMULATED = 600.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ class CampaignCfg:
     """Stop once the success rate's 95 % interval is no wider than plus or minus this; 0 runs all episodes."""
     until_ci_per_cell: bool = False
     """With `until_ci`: every cell of the grid goes on until its own interval is narrow enough."""
-    episode_limit_s: float = 600.0
-    """Wall-clock limit of one episode; past it the episode counts as `hung`."""
+    episode_limit_s: float | None = None
+    """Wall-clock limit of one episode; past it the episode counts as `hung`. None: see `wall_limit_s`."""
     axes: tuple[AxisCfg, ...] = ()
     """What varies. Grid axes are crossed with each other; drawn axes are drawn anew for each episode."""
     episode: Mapping[str, Any] = field(default_factory=dict[str, Any])
@@ -65,7 +66,7 @@ class CampaignCfg:
             raise ConfigError("until_ci", self.until_ci, "half an interval's width, above 0 and below 0.5, or 0")
         if self.until_ci_per_cell and not self.until_ci:
             raise ConfigError("until_ci_per_cell", True, "until_ci beside it, the width that each cell is to reach")
-        if not self.episode_limit_s > 0.0:
+        if self.episode_limit_s is not None and not self.episode_limit_s > 0.0:
             raise ConfigError("episode_limit_s", self.episode_limit_s, "a time above 0 s")
         names = [axis.name for axis in self.axes]
         if len(set(names)) != len(names):
@@ -77,6 +78,16 @@ class CampaignCfg:
                 if axis.name == "level" and value not in LEVELS:
                     raise ConfigError("axes.level", value, f"one of {', '.join(map(str, LEVELS))}")
                 base.override(axis.changes(value))
+
+    @property
+    def wall_limit_s(self) -> float:
+        """`episode_limit_s`, or else five times what an episode may take in simulated time, and 600 s at least.
+
+        Rendered episodes run faster than real time on a machine that is not crowded; five leaves room for one that is.
+        """
+        if self.episode_limit_s is not None:
+            return self.episode_limit_s
+        return max(_LEAST_LIMIT_S, _TIMES_SIMULATED * self.base(self.level).world.limits.max_time_s)
 
     def base(self, level: int) -> AnyEpisodeCfg:
         """What all episodes of a level share.

@@ -82,7 +82,8 @@ class SweepFlags:
     sampling: Literal["random", "latin_hypercube", "sobol"] | None = None
     """How axes that are distributions are drawn."""
     episode_limit: float | None = None
-    """Wall-clock limit of an episode in s; past it the episode counts as hung (600 by default)."""
+    """Wall-clock limit of an episode in s; past it the episode counts as hung. By default five times its simulated time
+    limit, and 600 s at least."""
     json: bool = False
     """Print the summary as one JSON object and nothing else."""
     level: str | None = None
@@ -268,12 +269,12 @@ def _deep(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
 
 def _executor(args: SweepFlags, cfg: CampaignCfg) -> Executor:
     if args.executor == "serial":
-        return SerialExecutor(cfg.episode_limit_s)
+        return SerialExecutor(cfg.wall_limit_s)
     if args.executor == "ray":
         from auvdock.campaign.ray_executor import RayExecutor
 
-        return RayExecutor(args.workers, cfg.episode_limit_s, args.address)
-    return ProcessExecutor(min(args.workers or usable_cores(), cfg.episodes), cfg.episode_limit_s)
+        return RayExecutor(args.workers, cfg.wall_limit_s, args.address)
+    return ProcessExecutor(min(args.workers or usable_cores(), cfg.episodes), cfg.wall_limit_s)
 
 
 def _plain(summary: CampaignSummary) -> dict[str, Any]:

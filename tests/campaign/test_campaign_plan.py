@@ -120,6 +120,18 @@ def test_a_level_axis_starts_each_episode_from_its_level():
     assert [plan.config(plan[index]) for index in range(5)] == [level_cfg(level) for level in range(5)]
 
 
+@pytest.mark.parametrize(("station", "simulated_s"), [("conical", 240.0), ("rotating", 600.0), ("landing", 240.0)])
+def test_a_slow_machine_may_finish_its_longest_episode(station, simulated_s):
+    cfg = CampaignCfg(station=station)
+    assert cfg.base(1).world.limits.max_time_s == simulated_s
+    assert cfg.wall_limit_s == 5.0 * simulated_s
+    brief = CampaignCfg(station=station, episode={"world": {"limits": {"max_time_s": 2.0}}})
+    assert brief.wall_limit_s == 600.0
+    assert CampaignCfg(station=station, episode_limit_s=7.0).wall_limit_s == 7.0
+    with pytest.raises(ConfigError, match="episode_limit_s"):
+        CampaignCfg(station=station, episode_limit_s=0.0)
+
+
 def test_a_campaign_survives_its_manifest():
     axes = (
         AxisCfg("current", low=0.0, high=0.5, count=6),
