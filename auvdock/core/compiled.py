@@ -1,0 +1,30 @@
+"""Loops over pixels, compiled by Numba where NumPy would take a dozen passes over the memory.
+
+A compiled function is plain Python that also runs uncompiled (`function.py_func`), and the tests hold the two against
+each other. It is compiled once, on its first call with arguments of its types, and kept on disk beside its module, or
+in the user's cache folder, or not at all where neither can be written. Arithmetic keeps to IEEE 754, so the same
+machine gives the same bits each time.
+
+Numba notices when the file of a kept function changes, but not when a function that it calls from another file does:
+hence a compiled function calls only compiled functions of its own file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, ParamSpec, TypeVar
+
+__all__ = ["compiled"]
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_numba: Any = import_module("numba")
+
+
+def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile a function with Numba; as in NumPy, x / 0 is `inf` or `nan`; indices are not checked."""
+    try:
+        return _numba.njit(cache=True, error_model="numpy")(function)
+    except RuntimeError:  # no folder for the cache can be written
+        return _numba.njit(error_model="numpy")(function)

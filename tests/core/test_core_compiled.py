@@ -1,0 +1,31 @@
+import numpy as np
+
+from auvdock.core.compiled import compiled
+
+
+def count_above(values, level):
+    count = 0
+    for value in values:
+        if value > level:
+            count += 1
+    return count
+
+
+def test_compiled_equals_plain():
+    values = np.random.default_rng(3).normal(size=1000)
+    assert compiled(count_above)(values, 0.3) == count_above(values, 0.3) == np.count_nonzero(values > 0.3)
+
+
+def test_divides_by_zero_as_numpy_does():
+    def ratio(one, other):
+        return one / other
+
+    assert compiled(ratio)(1.0, 0.0) == np.inf
+    assert np.isnan(compiled(ratio)(0.0, 0.0))
+
+
+def test_compiles_where_no_cache_can_be_kept():
+    # Code without a file has no place for one, like a package in a read-only folder of a user without a home.
+    space = {}
+    exec("def twice(x):\n    return 2 * x", space)
+    assert compiled(space["twice"])(21) == 42
