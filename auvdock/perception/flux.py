@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.arrays import Array, BoolArray, Image, IntArray
+from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Frame
 from auvdock.core.response import SATURATED_CODE
 
@@ -53,23 +54,19 @@ def _above(frame: Frame, u: float, v: float, radius: float, table: Array, wide: 
     right, bottom = min(round(u) + reach + 1, width), min(round(v) + reach + 1, height)
     if right - left < 2 or bottom - top < 2:
         return 0.0
-    patch = frame.image[top:bottom, left:right]
-    channel = int(patch.sum(axis=(0, 1), dtype=np.int64).argmax())
-    codes = patch[:, :, channel]
-    saturated = codes >= SATURATED_CODE
+    channel = int(_channel_sums(frame.image, left, top, right, bottom).argmax())
+    edges_px = _EDGES[: last + 1] * radius
+    count, total, saturated = _rings(frame.image, left, top, right, bottom, channel, u, v, edges_px, table)
     if not wide and saturated.any():
         return _above(frame, u, v, radius, table, True)
-    distance = np.hypot(np.arange(left, right)[None, :] - u, np.arange(top, bottom)[:, None] - v) / radius
-    ring = np.searchsorted(_EDGES[: last + 1], distance.ravel(), side="right") - 1
-    count = np.bincount(ring, minlength=last + 1)[:last]
-    mean = np.bincount(ring, table[codes].ravel(), minlength=last + 1)[:last] / np.maximum(count, 1)
-    shown = count > 0
+    count, total, saturated = count[:last], total[:last], saturated[:last]
+    mean = total / np.maximum(count, 1.0)
+    shown = count > 0.0
     if not shown[_AROUND] and not wide:
         return 0.0
     if wide:
-        burnt = np.bincount(ring[saturated.ravel()], minlength=last + 1)[:last] > 0
         background = float(np.median(table[frame.image[::16, ::16, channel]]))
-        mean = _mended(mean, shown, burnt, background)
+        mean = _mended(mean, shown, saturated > 0.0, background)
     elif not shown.all():
         mean = np.interp(_MIDDLE[:last], _MIDDLE[:last][shown], mean[shown])
     areas = math.pi * radius**2 * np.diff(_EDGES[: _DISC + 1] ** 2)
@@ -95,3 +92,48 @@ def _mended(mean: Array, shown: BoolArray, burnt: BoolArray, background: float) 
     inner = slice(0, int(fit[0]))
     mended[inner] = floor + light[0] * np.exp(slope * (_MIDDLE[inner] - _MIDDLE[fit[0]]))
     return mended
+
+
+@compiled
+def _channel_sums(image: Image, left: int, top: int, right: int, bottom: int) -> IntArray:
+    """(3,) sums of the codes in a box, upper bounds excluded."""
+    sums = np.zeros(3, dtype=np.int64)
+    for y in range(top, bottom):
+        for x in range(left, right):
+            for channel in range(3):
+                sums[channel] += image[y, x, channel]
+    return sums
+
+
+@compiled
+def _rings(
+    image: Image,
+    left: int,
+    top: int,
+    right: int,
+    bottom: int,
+    channel: int,
+    u: float,
+    v: float,
+    edges_px: Array,
+    table: Array,
+) -> tuple[Array, Array, Array]:
+    """Pixels, electrons and saturated pixels (k + 1,) of a box by rings, and of what lies beyond the last.
+
+    The rings lie about (u, v) between radii `edges_px` (k + 1,), the first 0; the box excludes its upper bounds.
+    """
+    rings = len(edges_px) - 1
+    count, total, saturated = np.zeros(rings + 1), np.zeros(rings + 1), np.zeros(rings + 1)
+    edges2 = edges_px * edges_px
+    for y in range(top, bottom):
+        for x in range(left, right):
+            distance2 = (x - u) * (x - u) + (y - v) * (y - v)
+            ring = 0
+            while ring < rings and distance2 >= edges2[ring + 1]:
+                ring += 1
+            code = image[y, x, channel]
+            count[ring] += 1.0
+            total[ring] += table[code]
+            if code >= SATURATED_CODE:
+                saturated[ring] += 1.0
+    return count, total, saturated

@@ -17,6 +17,7 @@ import numpy as np
 from auvdock.core.arrays import Image
 from auvdock.core.contracts import Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
+from auvdock.perception.components import components
 from auvdock.perception.flux import spot_flux
 from auvdock.perception.spots import background, brightest_channel, crop_of, inside, light_class, noise_sigma
 
@@ -132,13 +133,13 @@ class ThresholdDetector:
 
     def _components(self, contrast: Image, threshold: float) -> list[tuple[int, int, int, int, int]]:
         """(x, y, width, height, area) of the components above a threshold."""
-        _, mask = cv2.threshold(contrast, threshold, 255, cv2.THRESH_BINARY)
-        count, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_16U)
-        if count > 2000:
+        found = components(contrast, threshold)
+        most = contrast.size
+        if len(found) > 2000:
             # A threshold drowned in noise: keep the largest, the rest is no light.
-            stats = stats[np.argsort(-stats[:, cv2.CC_STAT_AREA], kind="stable")[:2000]]
-            return [tuple(row) for row in stats.tolist() if row[4] >= self._cfg.min_area_px and row[4] < mask.size / 2]
-        return [tuple(row) for row in stats[1:].tolist() if row[4] >= self._cfg.min_area_px]
+            found = found[np.argsort(-found[:, 4], kind="stable")[:2000]]
+            most = contrast.size / 2
+        return [tuple(row) for row in found.tolist() if self._cfg.min_area_px <= row[4] <= most]
 
     def _split(
         self, patch: Image, floor: float, x: int, y: int, prominence: float, spots: list[_Spot], depth: int = 0

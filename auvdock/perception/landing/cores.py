@@ -9,6 +9,7 @@ is much dimmer than the brightest is none of them: a lit tag, a glint, the platf
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,9 +17,11 @@ import cv2
 import numpy as np
 
 from auvdock.core.arrays import Array, Image, IntArray
+from auvdock.core.compiled import compiled
 from auvdock.core.contracts import BLUE, RED, Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
-from auvdock.perception.spots import inside, noise_sigma
+from auvdock.perception.components import peaked_components
+from auvdock.perception.spots import inside, mean_channel, noise_sigma
 
 __all__ = ["CoreCfg", "CoreDetector"]
 
@@ -80,7 +83,7 @@ class CoreDetector:
     def _detect(self, image: Image) -> Detections:
         cfg = self._cfg
         half = cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-        small = _mean_channel(np.asarray(half, dtype=np.uint8))
+        small = mean_channel(np.asarray(half, dtype=np.uint8))
         base, peak = _median(small[::2, ::2], 0), float(small.max())
         sigma = noise_sigma(small)
         if peak - base < max(cfg.min_contrast, 8.0 * sigma):
@@ -89,26 +92,19 @@ class CoreDetector:
         height, width = small.shape
         small = np.ascontiguousarray(small[top:bottom, left:right])
         # One pixel of each component that was taken: at a lower cut the rest of it is where that is.
-        columns: list[int] = []
-        rows: list[int] = []
+        taken: list[tuple[int, int]] = []
         boxes: list[Array] = []
         centres: list[Array] = []
         peaks: list[float] = []
         for share in cfg.levels:
             cut = base + share * (peak - base)
-            _, mask = cv2.threshold(small, cut, 255, cv2.THRESH_BINARY)
-            count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_16U)
-            old = set(np.asarray(labels)[rows, columns].tolist())
-            for label in range(1, count):
-                x, y, w, h, area = stats[label].tolist()
-                if label in old or area < cfg.min_area_px:
+            found = peaked_components(small, cut, np.array(taken, dtype=np.int64).reshape(-1, 2))
+            for x, y, w, h, area, highest, column, row, old in found.tolist():
+                if old or area < cfg.min_area_px:
                     continue
-                part = np.equal(labels[y : y + h, x : x + w], label).view(np.uint8)
-                _, highest, _, (column, row) = cv2.minMaxLoc(small[y : y + h, x : x + w], part)
                 if share < cfg.levels[0] and highest - cut < cfg.prominence * (peak - base):
                     continue
-                columns.append(x + column)
-                rows.append(y + row)
+                taken.append((column, row))
                 x, y = x + left, y + top
                 cut_off = x == 0 or y == 0 or x + w == width or y + h == height
                 if cut_off or max(w, h) > cfg.max_aspect * min(w, h) + 2.0:
@@ -122,12 +118,6 @@ class CoreDetector:
         return _detections(image, boxes, centres, np.array(peaks) / sigma, cfg.max_lights)
 
 
-def _mean_channel(image: Image) -> Image:
-    """(H, W) mean over the channels, lightly smoothed against pixel noise."""
-    mean = cv2.transform(image, np.full((1, 3), 1.0 / 3.0))
-    return np.asarray(cv2.GaussianBlur(mean, (3, 3), 0.8), dtype=np.uint8)
-
-
 def _bounds(level: Image, cut: float) -> tuple[int, int, int, int]:
     """(left, top, right, bottom) of what is above a cut, two pixels wider."""
     _, mask = cv2.threshold(level, cut, 255, cv2.THRESH_BINARY)
@@ -137,16 +127,27 @@ def _bounds(level: Image, cut: float) -> tuple[int, int, int, int]:
 
 def _centre(image: Image, box: IntArray, cut: float) -> Array:
     """(2,) centroid of what closes within a box and a border of a few pixels, or at least of what is above the cut."""
-    x0, y0 = np.maximum(box[:2] - _BORDER_PX, 0).tolist()
-    patch = _mean_channel(image[y0 : box[3] + _BORDER_PX, x0 : box[2] + _BORDER_PX]).astype(np.float64)
-    rim = max(patch[0].max(), patch[-1].max(), patch[:, 0].max(), patch[:, -1].max())
-    weight = np.maximum(patch - min(float(rim), cut), 0.0)
-    total = float(weight.sum())
-    if not total > 0.0:
+    x0, y0, x1, y1 = box.tolist()
+    x0, y0 = max(x0 - _BORDER_PX, 0), max(y0 - _BORDER_PX, 0)
+    column, row = _centroid(mean_channel(image[y0 : y1 + _BORDER_PX, x0 : x1 + _BORDER_PX]), cut)
+    if math.isnan(column):
         return 0.5 * (box[:2] + box[2:] - 1).astype(np.float64)
-    column = float(weight.sum(axis=0) @ np.arange(weight.shape[1])) / total
-    row = float(weight.sum(axis=1) @ np.arange(weight.shape[0])) / total
     return np.array([x0 + column, y0 + row])
+
+
+@compiled
+def _centroid(patch: Image, cut: float) -> tuple[float, float]:
+    """Column and row of the centroid of what closes within a patch, or at least of what is above the cut; or nan."""
+    rim = max(patch[0].max(), patch[-1].max(), patch[:, 0].max(), patch[:, -1].max())
+    ground = min(float(rim), cut)
+    total = column = row = 0.0
+    for y in range(patch.shape[0]):
+        for x in range(patch.shape[1]):
+            weight = max(patch[y, x] - ground, 0.0)
+            total += weight
+            column += weight * x
+            row += weight * y
+    return column / total, row / total
 
 
 def _median(image: Image, channel: int) -> float:
