@@ -214,10 +214,10 @@ class UnderwaterCamera:
                 drawn = even
         cv2.resize(image, self._whole.shape[1::-1], self._whole, interpolation=cv2.INTER_LINEAR)
         if self.tag is not None:
-            self.tag.add(self._buffer, view.T_world_camera, exposure_s, drawn, hidden=self._hidden)
+            self.tag.add(self._whole, view.T_world_camera, exposure_s, drawn, hidden=self._hidden)
         near, shown = lens.locate(received.ray_camera, self._lights.reach_px)
         index = lit[shown[lit]]
-        self._lights.add_fine(self._buffer, received, near, index, exposure_s)
+        self._lights.add_fine(self._whole, received, near, index, exposure_s)
         if view.flakes is not None:
             self._add_flakes(view, exposure_s)
         return self._buffer
@@ -242,4 +242,4 @@ class UnderwaterCamera:
             energy = (colour * light).astype(np.float32)
             if energy.max() > floor:
                 sigma = float(np.hypot(self._cfg.lens_sigma_px, width))
-                add_spot(self._buffer, pixel, min(sigma, 20.0), energy)
+                add_spot(self._whole, pixel, min(sigma, 20.0), energy)
