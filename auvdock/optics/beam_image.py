@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
 from auvdock.core.transforms import cross
 from auvdock.optics.beam_pieces import BeamPieces, PieceLight
 from auvdock.optics.lens import Lens
-from auvdock.optics.lights_image import coloured
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.rotating_light import Beam
 from auvdock.optics.water import WaterCfg
@@ -28,6 +28,8 @@ _ENTRIES = 384
 _RIBBON = 256
 _LEAST_E = 0.05
 """Electrons in a pixel that are not worth drawing: a hundredth of the read noise."""
+_NOTHING = 0.02
+"""Of that, what a pixel across the ribbon is left out for."""
 
 
 class BeamImage:
@@ -43,10 +45,11 @@ class BeamImage:
         self._least_rad = 0.7 * lens.factor * lens.rad_per_px
         self._pieces = BeamPieces(water, 2.0 * self._least_rad)
         rays = lens.rays.astype(np.float32)
-        self._rays = rays
+        self._rays = np.ascontiguousarray(rays.T)
         self._few_shape = (-(-lens.shape[0] // 2), -(-lens.shape[1] // 2))
-        self._few = np.ascontiguousarray(cv2.resize(rays.reshape(*lens.shape, 3), self._few_shape[::-1]).reshape(-1, 3))
-        self._few /= np.linalg.norm(self._few, axis=1, keepdims=True)
+        few = cv2.resize(rays.reshape(*lens.shape, 3), self._few_shape[::-1]).reshape(-1, 3)
+        few /= np.linalg.norm(few, axis=1, keepdims=True)
+        self._few = np.ascontiguousarray(few.T)
         self._solid_angle = lens.solid_angle_sr.astype(np.float32)
         self._pixel_sr = lens.rad_per_px**2
         self._channel = lights.electrons_per_j[lamp] * lens.aperture_m2
@@ -56,12 +59,10 @@ class BeamImage:
         pieces = self._pieces.light(beam)
         floor = _LEAST_E / (float(self._channel.max()) * exposure_s * self._pixel_sr)
         radiance = self._blobs(beam, pieces, floor)
-        sharp = self._ribbon(beam, pieces.ribbon * beam.light_w_m2, floor)
-        if sharp is not None:
-            radiance = sharp if radiance is None else np.add(radiance, sharp, dtype=np.float32)
-        if radiance is not None:
-            radiance *= self._solid_angle
-            image += coloured(radiance, (self._channel * exposure_s).astype(np.float32))
+        if radiance is None:
+            radiance = np.zeros(self._shape, dtype=np.float32)
+        self._add_ribbon(radiance, beam, pieces.ribbon * beam.light_w_m2, floor)
+        _add_coloured(image, radiance, self._solid_angle, (self._channel * exposure_s).astype(np.float32))
 
     def _blobs(self, beam: Beam, pieces: PieceLight, floor: float) -> NDArray[np.float32] | None:
         """(h, w) radiance of the Gaussians and halos about the pieces."""
@@ -70,27 +71,14 @@ class BeamImage:
         index = np.flatnonzero(tables[:, 0] > floor)
         if len(index) == 0:
             return None
-        chord2 = 2.0 - 2.0 * (beam.rays_camera[index].astype(np.float32) @ self._few.T)
-        np.maximum(chord2, 0.0, out=chord2)
-        np.sqrt(chord2, out=chord2)
-        np.sqrt(chord2, out=chord2)
-        chord2 *= self._scale
-        entry = chord2.astype(np.int32)
-        np.minimum(entry, _ENTRIES - 2, out=entry)
-        chord2 -= entry
-        entry += (np.arange(len(index), dtype=np.int32) * _ENTRIES)[:, None]
-        flat = tables[index].astype(np.float32).ravel()
-        lower = flat.take(entry)
-        entry += 1
-        value = flat.take(entry)
-        value -= lower
-        value *= chord2
-        value += lower
-        few = value.sum(axis=0).reshape(self._few_shape)
-        return np.asarray(cv2.resize(few, self._shape[::-1], interpolation=cv2.INTER_LINEAR), dtype=np.float32)
+        few = np.zeros(self._few.shape[1], dtype=np.float32)
+        rays = beam.rays_camera[index].astype(np.float32)
+        _add_tables(few, self._few, rays, tables[index].astype(np.float32), self._scale)
+        enlarged = cv2.resize(few.reshape(self._few_shape), self._shape[::-1], interpolation=cv2.INTER_LINEAR)
+        return np.asarray(enlarged, dtype=np.float32)
 
-    def _ribbon(self, beam: Beam, light: Array, floor: float) -> NDArray[np.float32] | None:
-        """(h, w) radiance of the sharp part: light per angle along, spread as a Gaussian across."""
+    def _add_ribbon(self, radiance: NDArray[np.float32], beam: Beam, light: Array, floor: float) -> None:
+        """Add the sharp part to radiance (h, w): light per angle along, spread as a Gaussian across."""
         edge = beam.edge_rad
         span = float(edge[-1])
         grid = np.linspace(0.0, span, _RIBBON)
@@ -100,18 +88,85 @@ class BeamImage:
         width = np.maximum(np.interp(grid, 0.5 * (edge[1:] + edge[:-1]), beam.width_rad), self._least_rad)
         along /= math.sqrt(2.0 * math.pi) * width
         if float(along.max()) < floor:
-            return None
-        frame = np.array([beam.ray_camera, beam.along_camera, cross(beam.ray_camera, beam.along_camera)])
-        local = self._rays @ frame.T.astype(np.float32)
-        place = np.arctan2(local[:, 1], local[:, 0])
-        place *= np.float32((_RIBBON - 1) / span)
-        place += np.float32(0.5)
-        before = place < 0.0
-        entry = place.astype(np.int32)
-        np.clip(entry, 0, _RIBBON - 1, out=entry)
-        shown = local[:, 2] * local[:, 2]
-        shown *= (-0.5 / width**2).astype(np.float32).take(entry)
-        np.exp(shown, out=shown)
-        shown *= along.astype(np.float32).take(entry)
-        shown[before] = 0.0
-        return np.asarray(shown.reshape(self._shape), dtype=np.float32)
+            return
+        reach = float((width * np.sqrt(2.0 * np.log(np.maximum(along / (_NOTHING * floor), 1.0)))).max())
+        axes = np.array([beam.ray_camera, beam.along_camera, cross(beam.ray_camera, beam.along_camera)])
+        _add_along(
+            radiance.ravel(),
+            self._rays,
+            axes.astype(np.float32),
+            along.astype(np.float32),
+            (-0.5 / width**2).astype(np.float32),
+            np.float32((_RIBBON - 1) / span),
+            np.float32(reach),
+        )
+
+
+@compiled
+def _add_tables(
+    radiance: NDArray[np.float32],
+    grid: NDArray[np.float32],
+    rays: NDArray[np.float32],
+    tables: NDArray[np.float32],
+    scale: np.float32,
+) -> None:
+    """Add to radiance (n,) at a grid (3, n) the tables (m, entries) about rays (m, 3), linear between entries."""
+    count, last = grid.shape[1], tables.shape[1] - 2
+    place = np.empty(count, dtype=np.float32)
+    for piece in range(len(rays)):
+        x, y, z = rays[piece]
+        table = tables[piece]
+        for i in range(count):
+            dx, dy, dz = grid[0, i] - x, grid[1, i] - y, grid[2, i] - z
+            place[i] = np.sqrt(np.sqrt(dx * dx + dy * dy + dz * dz)) * scale
+        for i in range(count):
+            entry = min(np.int32(place[i]), last)
+            radiance[i] += table[entry] + (place[i] - np.float32(entry)) * (table[entry + 1] - table[entry])
+
+
+@compiled
+def _add_along(
+    radiance: NDArray[np.float32],
+    grid: NDArray[np.float32],
+    axes: NDArray[np.float32],
+    along: NDArray[np.float32],
+    across: NDArray[np.float32],
+    per_rad: np.float32,
+    widest: np.float32,
+) -> None:
+    """Add a ribbon to radiance (n,) at a grid (3, n).
+
+    It starts at the first of `axes` (3, 3) and runs towards the second: along (k,) e^{across (k,) d²}, d the sine of
+    the angle from the great circle.
+    """
+    count, last = grid.shape[1], len(along) - 1
+    away = np.empty(count, dtype=np.float32)
+    for i in range(count):
+        away[i] = grid[0, i] * axes[2, 0] + grid[1, i] * axes[2, 1] + grid[2, i] * axes[2, 2]
+    for i in range(count):
+        d = away[i]
+        if d > widest or d < -widest:
+            continue
+        start = grid[0, i] * axes[0, 0] + grid[1, i] * axes[0, 1] + grid[2, i] * axes[0, 2]
+        further = grid[0, i] * axes[1, 0] + grid[1, i] * axes[1, 1] + grid[2, i] * axes[1, 2]
+        place = np.arctan2(further, start) * per_rad + np.float32(0.5)
+        if place >= 0.0:
+            entry = min(np.int32(place), last)
+            radiance[i] += along[entry] * np.exp(across[entry] * d * d)
+
+
+@compiled
+def _add_coloured(
+    image: NDArray[np.float32],
+    radiance: NDArray[np.float32],
+    solid_angle: NDArray[np.float32],
+    colour: NDArray[np.float32],
+) -> None:
+    """Add radiance (h, w) times solid angle (h, w) and colour (3,) to an image (h, w, 3)."""
+    red, green, blue = colour
+    for j in range(image.shape[0]):
+        for i in range(image.shape[1]):
+            value = radiance[j, i] * solid_angle[j, i]
+            image[j, i, 0] += value * red
+            image[j, i, 1] += value * green
+            image[j, i, 2] += value * blue

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
+from auvdock.core.compiled import compiled
 from auvdock.optics.halo import halo_table
 from auvdock.optics.rotating_light import Beam
 from auvdock.optics.water import WaterCfg
@@ -23,6 +24,8 @@ __all__ = ["BeamPieces", "PieceLight"]
 
 _ANGLES = 512
 _FIRST_RAD = 1e-4
+_LEAST_EXPONENT = -60.0
+"""Of a Gaussian; what is left there is below the rounding of the halo."""
 _FILL = 0.7
 """Standard deviation of a piece's Gaussian over the piece's length."""
 
@@ -87,21 +90,33 @@ class BeamPieces:
             angle2: squared angles.
             gauss: (k,) shares in the Gaussians, `blob` or with the ribbon on top.
         """
-        size2 = pieces.size_rad[:, None] ** 2
-        column, right = self._place(0.5 * np.log(angle2 + size2))
-        column += (np.arange(len(size2)) * _ANGLES)[:, None]
-        low = pieces.log_density.take(column)
-        density = pieces.log_density.take(column + 1)
-        density -= low
-        density *= right
-        density += low
-        np.exp(density, out=density)
-        density *= pieces.scattered[:, None]
-        density += np.exp(angle2 * (-0.5 / size2)) * (gauss / (2.0 * math.pi * pieces.size_rad**2))[:, None]
-        return density
+        each = np.broadcast_to(angle2, (len(pieces.size_rad), angle2.shape[-1]))
+        return _per_sr(*pieces[:3], gauss, each, self._first, self._per_step)
 
     def _place(self, log_angle: Array) -> tuple[IntArray, Array]:
         """Column below each log angle and the weight of the one above."""
         place = (log_angle - self._first) * self._per_step
         column = np.minimum(place.astype(np.int64), _ANGLES - 2)
         return column, place - column
+
+
+@compiled
+def _per_sr(
+    size_rad: Array, log_density: Array, scattered: Array, gauss: Array, angle2: Array, first: float, per_step: float
+) -> Array:
+    """`BeamPieces.per_sr` at squared angles (k, n)."""
+    pieces, count = angle2.shape
+    density = np.empty((pieces, count))
+    last = log_density.shape[1] - 2
+    for k in range(pieces):
+        size2 = size_rad[k] * size_rad[k]
+        peak, table = gauss[k] / (2.0 * math.pi * size2), log_density[k]
+        for i in range(count):
+            place = (0.5 * np.log(angle2[k, i] + size2) - first) * per_step
+            column = min(int(place), last)
+            halo = table[column] + (place - column) * (table[column + 1] - table[column])
+            density[k, i] = scattered[k] * np.exp(halo)
+            exponent = angle2[k, i] * (-0.5 / size2)
+            if exponent > _LEAST_EXPONENT:
+                density[k, i] += peak * np.exp(exponent)
+    return density

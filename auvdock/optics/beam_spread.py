@@ -23,7 +23,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import j0, j1
 
-from auvdock.core.arrays import Array, IntArray
+from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
 from auvdock.optics.halo import wells_transfer
 
 __all__ = ["BeamSpread", "beam_spread"]
@@ -74,11 +75,7 @@ class BeamSpread:
         return self._between(self._lead, br, angle_rad)
 
     def _between(self, table: Array, br: Array, angle_rad: Array) -> Array:
-        row, up = _place(np.log(np.clip(br, _MIN_BR, _MAX_BR)), self._log_br)
-        column, right = _place(np.log(np.clip(angle_rad, _FIRST_RAD, math.pi)), self._log_angle)
-        low = table[row, column] * (1.0 - right) + table[row, column + 1] * right
-        high = table[row + 1, column] * (1.0 - right) + table[row + 1, column + 1] * right
-        return low * (1.0 - up) + high * up
+        return _between(table, self._log_br, self._log_angle, br.ravel(), angle_rad.ravel()).reshape(br.shape)
 
 
 @lru_cache(maxsize=16)
@@ -103,7 +100,18 @@ def _slope(br: float, nu: Array, theta0_rad: float) -> Array:
     return 2.0 * math.pi * theta0_rad * br * np.exp(br * (mean - 1.0)) * (k * np.exp(-k) + np.expm1(-k)) / k**2
 
 
-def _place(value: Array, grid: Array) -> tuple[IntArray, Array]:
-    place = (value - grid[0]) / (grid[1] - grid[0])
-    index = np.minimum(place.astype(np.int64), len(grid) - 2)
-    return index, place - index
+@compiled
+def _between(table: Array, log_br: Array, log_angle: Array, br: Array, angle_rad: Array) -> Array:
+    """(n,) the table at b r (n,) and angles (n,), linear between its rows and columns."""
+    value = np.empty(len(br))
+    last_row, last_column = len(log_br) - 2, len(log_angle) - 2
+    for i in range(len(br)):
+        up = (np.log(min(max(br[i], _MIN_BR), _MAX_BR)) - log_br[0]) / (log_br[1] - log_br[0])
+        right = (np.log(min(max(angle_rad[i], _FIRST_RAD), math.pi)) - log_angle[0]) / (log_angle[1] - log_angle[0])
+        row, column = min(int(up), last_row), min(int(right), last_column)
+        up -= row
+        right -= column
+        low = table[row, column] * (1.0 - right) + table[row, column + 1] * right
+        high = table[row + 1, column] * (1.0 - right) + table[row + 1, column + 1] * right
+        value[i] = low * (1.0 - up) + high * up
+    return value

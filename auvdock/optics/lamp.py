@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
+from auvdock.optics.lamp_light import add_beamed
 from auvdock.optics.lens import Lens
 from auvdock.optics.light import beam_profile, profile_solid_angle_sr
 from auvdock.optics.water import WaterCfg
@@ -95,33 +96,19 @@ class VehicleLamp:
             light += shape[:, None] * np.exp(-d[:, None] * self._loss_per_m)
         return light * self.peak_w_sr
 
-    def irradiance_along(self, rays: NDArray[np.float32], distance: NDArray[np.float32]) -> NDArray[np.float32]:
-        """`irradiance` (n, 3) at distances (n,) along unit rays (n, 3), in single precision and faster.
-
-        The angle from the axis is taken as θ² = 2 (1 - cos θ) (1 + (1 - cos θ) / 6), 1 % low at 70°.
-        """
-        # A row per band: NumPy is slow over the last three of an array (n, 3).
-        light = np.zeros((3, len(rays)), dtype=np.float32)
-        depth = rays[:, 2] * distance
-        loss = -self._loss_per_m.astype(np.float32)
+    def add_along(self, light: NDArray[np.float32], rays: NDArray[np.float32], distance: NDArray[np.float32]) -> None:
+        """Add `irradiance` to light (3, n) at distances (n,) along unit rays (3, n): single precision, and faster."""
         half = math.radians(self.cfg.beam_angle_deg) / 2.0
-        narrow = np.float32(-2.0 * math.log(2.0) / half**2)
-        for position in self._positions.astype(np.float32):
-            # |s r - p|² = s² - 2 s (r · p) + p²
-            d2 = distance - 2.0 * (rays @ position)
-            d2 *= distance
-            d2 += float(position @ position)
-            np.maximum(d2, np.float32(_LEAST_M2), out=d2)
-            d = np.sqrt(d2)
-            cosine = (depth - position[2]) / d
-            np.clip(cosine, 0.0, 1.0, out=cosine)
-            versed = 1.0 - cosine
-            versed *= narrow * (1.0 + versed * np.float32(1.0 / 6.0))
-            shape = cosine / d2
-            for band in range(3):
-                light[band] += shape * cv2.exp(versed + loss[band] * d).ravel()
-        light *= self.peak_w_sr.astype(np.float32)[:, None]
-        return light.T
+        add_beamed(
+            light,
+            rays,
+            distance,
+            self._positions.astype(np.float32),
+            self._loss_per_m.astype(np.float32),
+            self.peak_w_sr.astype(np.float32),
+            np.float32(2.0 * math.log(2.0) / half**2),
+            np.float32(_LEAST_M2),
+        )
 
     def brightest(self, distance_m: Array) -> Array:
         """(n, 3) upper bound of the irradiance on anything at distances (n,) from the camera."""

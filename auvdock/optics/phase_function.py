@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
 
 __all__ = ["fournier_forand", "wells_phase", "wide_angle_phase"]
 
@@ -16,6 +17,7 @@ _INDEX, _SLOPE = 1.10, 3.5835
 _ONSET_RAD = 0.5
 
 
+@compiled
 def fournier_forand(angle_rad: Array) -> Array:
     """(n,) phase function in 1/sr at scattering angles (n,), ∫ p dω = 1 (Fournier & Forand 1994).
 
@@ -34,11 +36,13 @@ def fournier_forand(angle_rad: Array) -> Array:
     return head + tail
 
 
+@compiled
 def wells_phase(angle_rad: Array, theta0_rad: float) -> Array:
     """(n,) phase function in 1/sr behind Wells' (1973) transfer function: θ0 / (2π (β² + θ0²)^{3/2})."""
     return theta0_rad / (2.0 * math.pi * (angle_rad**2 + theta0_rad**2) ** 1.5)
 
 
+@compiled
 def wide_angle_phase(angle_rad: Array, theta0_rad: float) -> Array:
     """(n,) what Fournier and Forand's function has beyond Wells' at wide angles, in 1/sr.
 

@@ -109,6 +109,16 @@ def test_irradiance_in_water_keeps_what_is_scattered_forwards():
     assert got == pytest.approx(unit.peak_w_sr / 4.0 * np.exp(-2.0 * (water.absorption + water.backscattering)))
 
 
+def test_light_along_rays_is_the_irradiance():
+    unit = lamp("lake")
+    rays = LENS.rays
+    distance = np.random.default_rng(4).uniform(0.3, 30.0, len(rays))
+    light = np.ones((3, len(rays)), dtype=np.float32)
+    unit.add_along(light, np.ascontiguousarray(rays.T, dtype=np.float32), distance.astype(np.float32))
+    wanted = unit.irradiance(rays * distance[:, None])
+    assert light.T - 1.0 == pytest.approx(wanted, rel=0.012, abs=2e-7)
+
+
 def test_brightest_bounds_irradiance():
     unit = lamp("lake")
     rng = np.random.default_rng(3)

@@ -46,6 +46,17 @@ def test_codes_and_electrons_are_inverse(encoding):
     assert scale.electrons(np.array([255.0]))[0] == pytest.approx(20000.0)
 
 
+@pytest.mark.parametrize("encoding", ["sqrt", "linear"])
+def test_codes_are_the_rounded_codes_of_the_scale(encoding):
+    cfg = ImagingCfg(encoding=encoding, noise=False)
+    electrons = np.linspace(0.0, 1.2 * cfg.full_well_e / 2.0, 640 * 360 * 3, dtype=np.float32).reshape(360, 640, 3)
+    image = Sensor(640, 360, cfg).expose(electrons, 2.0)
+    wanted = np.clip(SensorScale(cfg, 2.0).codes(electrons.astype(np.float64)), 0.0, 255.0)
+    assert np.abs(image - wanted).max() < 0.501
+    # Light beyond all measure saturates, it does not wrap around.
+    assert Sensor(2, 2, cfg).expose(np.full((2, 2, 3), 1e30, dtype=np.float32), 2.0).min() == 255
+
+
 def test_saturation_clips_and_counts():
     cfg = ImagingCfg(noise=False)
     sensor = Sensor(640, 360, cfg)
