@@ -10,15 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.compiled import compiled
 from auvdock.core.vehicle import VehicleCfg
 
 __all__ = ["GRAVITY_M_S2", "Hydrodynamics"]
 
 GRAVITY_M_S2 = 9.81
 """Standard of the vehicle data: weight = mass × 9.81."""
-
-_TRIL = np.ravel_multi_index(np.tril_indices(6), (6, 6))
 
 
 class Hydrodynamics:
@@ -56,81 +55,123 @@ class Hydrodynamics:
             thrust = float(np.linalg.norm(column[:3]))
             weights[12 + slot, :6] = column / thrust if thrust > 0.0 else 0.0
         self._weights = weights
-        self._fins = [21 + index for index, actuator in enumerate(vehicle.actuators) if actuator.kind == "fin"]
+        fins = [21 + index for index, actuator in enumerate(vehicle.actuators) if actuator.kind == "fin"]
+        self._fins = np.array(fins, dtype=np.int64)
         """Their places in z."""
         self._buoyancy_n = vehicle.buoyancy_n
-        self._added = added
-        self._frame = np.eye(6)
-        self._half, self._whole, self._rows = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(21)
+        self._added = np.ascontiguousarray(added)
 
-    def added_mass_rows(self, rotation: Array) -> Array:
-        """(21,) lower triangle, row by row, of T M_A Tᵀ with T = diag(R, 1): M_A in a free joint's coordinates.
+    def add_mass(self, rows: Array, rotation: Array) -> None:
+        """Add T M_A Tᵀ with T = diag(R, 1), M_A in a free joint's coordinates, to its mass matrix.
 
-        A free joint's velocity is (linear in the world frame, angular in the body frame). The array is overwritten by
-        the next call.
+        A free joint's velocity is (linear in the world frame, angular in the body frame).
+
+        Args:
+            rows: (21,) lower triangle of the mass matrix, row by row.
+            rotation: (3, 3) R, body to world.
         """
-        frame = self._frame
-        frame[:3, :3] = rotation
-        frame.dot(self._added, self._half)
-        self._half.dot(frame.T, self._whole)
-        return self._whole.take(_TRIL, out=self._rows, mode="clip")  # mode: "raise" would copy through a buffer
+        _add_mass(rows, rotation, self._added)
 
     def wrench(
         self,
-        rotation: Sequence[float],
-        velocity_world: Sequence[float],
-        angular_body: Sequence[float],
+        rotation: Array,
+        velocity: Array,
+        water: tuple[float, float, float],
         gust_acceleration: tuple[float, float],
-        actuators: Sequence[float],
-    ) -> tuple[list[float], list[float]]:
+        actuators: Array,
+    ) -> tuple[Array, Array]:
         """Generalised force on the free joint, and the thrusters' advance speeds in m/s.
 
         Args:
-            rotation: R row by row, 9 numbers, body to world.
-            velocity_world: velocity through the water of the body's origin, world frame, m/s.
-            angular_body: p, q, r in rad/s.
+            rotation: (3, 3) R, body to world.
+            velocity: (6,) of the body's origin over ground in the world frame in m/s, and p, q, r in rad/s.
+            water: velocity of the water, world frame, m/s.
             gust_acceleration: horizontal acceleration of the water, world frame, m/s².
-            actuators: states in [-1, 1].
+            actuators: (n,) states in [-1, 1].
 
         Returns:
-            Six numbers (force in the world frame in N, moment about the origin in the body frame in N m), and one
-            advance speed for each thruster.
+            (6,) force in the world frame in N and moment about the origin in the body frame in N m, and the advance
+            speeds (k,) of the thrusters.
         """
-        r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation
-        vx, vy, vz = velocity_world
-        p, q, r = angular_body
-        gx, gy = gust_acceleration
-        u = r00 * vx + r10 * vy + r20 * vz
-        v = r01 * vx + r11 * vy + r21 * vz
-        w = r02 * vx + r12 * vy + r22 * vz
-        s = abs(u)
-        uu = u * s
-        z = [
-            *(u, v, w, p, q, r),
-            *(uu, v * abs(v), w * abs(w), p * abs(p), q * abs(q), r * abs(r)),
-            *(uu, s * v, s * w, s * p, s * q, s * r),
-            q * w - r * v + r00 * gx + r10 * gy,
-            r * u - p * w + r01 * gx + r11 * gy,
-            p * v - q * u + r02 * gx + r12 * gy,
-            *actuators,
-        ]
-        for place in self._fins:
-            z[place] *= uu
-        out: list[float] = self._weights.dot(np.array(z)).tolist()
-        fx, fy, fz, k, m, n, px, py, pz, hx, hy, hz, *advance = out
-        # −C_A(ν_r) ν_r = (p × ω, p × v + h × ω) with the added momenta p, h (Fossen 2011, equation 6.43).
-        fx += py * r - pz * q
-        fy += pz * p - px * r
-        fz += px * q - py * p
-        k += py * w - pz * v + hy * r - hz * q
-        m += pz * u - px * w + hz * p - hx * r
-        n += px * v - py * u + hx * q - hy * p
-        mass = self._displaced_kg
-        return [
-            r00 * fx + r01 * fy + r02 * fz + mass * gx,
-            r10 * fx + r11 * fy + r12 * fz + mass * gy,
-            r20 * fx + r21 * fy + r22 * fz + self._buoyancy_n,
-            k,
-            m,
-            n,
-        ], advance
+        return _wrench(
+            rotation,
+            velocity,
+            water,
+            gust_acceleration,
+            actuators,
+            self._weights,
+            self._fins,
+            self._displaced_kg,
+            self._buoyancy_n,
+        )
+
+
+@compiled
+def _add_mass(rows: Array, rotation: Array, added: Array) -> None:
+    """`Hydrodynamics.add_mass`."""
+    half, whole = added.copy(), added.copy()
+    for i in range(3):
+        for j in range(6):
+            half[i, j] = rotation[i, 0] * added[0, j] + rotation[i, 1] * added[1, j] + rotation[i, 2] * added[2, j]
+    for i in range(6):
+        a, b, c = half[i, 0], half[i, 1], half[i, 2]
+        for j in range(3):
+            whole[i, j] = a * rotation[j, 0] + b * rotation[j, 1] + c * rotation[j, 2]
+        for j in range(3, 6):
+            whole[i, j] = half[i, j]
+    place = 0
+    for i in range(6):
+        for j in range(i + 1):
+            rows[place] += whole[i, j]
+            place += 1
+
+
+@compiled
+def _wrench(
+    rotation: Array,
+    velocity: Array,
+    water: tuple[float, float, float],
+    gust: tuple[float, float],
+    actuators: Array,
+    weights: Array,
+    fins: IntArray,
+    displaced_kg: float,
+    buoyancy_n: float,
+) -> tuple[Array, Array]:
+    """`Hydrodynamics.wrench` with W (12 + k, 21 + n) and the fins' places in z."""
+    z = np.empty(weights.shape[1])
+    for i in range(3):
+        z[i] = 0.0
+        for j in range(3):
+            z[i] += rotation[j, i] * (velocity[j] - water[j])
+        z[3 + i] = velocity[3 + i]
+        z[18 + i] = rotation[0, i] * gust[0] + rotation[1, i] * gust[1]
+    u, v, w, p, q, r = z[:6]
+    s = abs(u)
+    for i in range(6):
+        z[6 + i] = z[i] * abs(z[i])
+        z[12 + i] = s * z[i]
+    z[18] += q * w - r * v
+    z[19] += r * u - p * w
+    z[20] += p * v - q * u
+    for i in range(len(actuators)):
+        z[21 + i] = actuators[i]
+    for place in fins:
+        z[place] *= u * s
+    out = np.zeros(len(weights))
+    for i in range(len(out)):
+        for j in range(len(z)):
+            out[i] += weights[i, j] * z[j]
+    px, py, pz, hx, hy, hz = out[6:12]
+    # −C_A(ν_r) ν_r = (p × ω, p × v + h × ω) with the added momenta p, h (Fossen 2011, equation 6.43).
+    fx, fy, fz = out[0] + py * r - pz * q, out[1] + pz * p - px * r, out[2] + px * q - py * p
+    force = np.empty(6)
+    for i in range(3):
+        force[i] = rotation[i, 0] * fx + rotation[i, 1] * fy + rotation[i, 2] * fz
+    force[0] += displaced_kg * gust[0]
+    force[1] += displaced_kg * gust[1]
+    force[2] += buoyancy_n
+    force[3] = out[3] + py * w - pz * v + hy * r - hz * q
+    force[4] = out[4] + pz * u - px * w + hz * p - hx * r
+    force[5] = out[5] + px * v - py * u + hx * q - hy * p
+    return force, out[12:]

@@ -202,8 +202,8 @@ class Simulator:
         if self._diverged:
             return
         model, data = self.model, self._data
+        state = self._actuators.step(command)
         values: list[float] = command.tolist() if isinstance(command, np.ndarray) else list(command)
-        state = self._actuators.step(values)
         qpos: list[float] = self._qpos.tolist()
         qvel: list[float] = self._qvel.tolist()
         self.history.append(HistoryEntry(self.time_s, qpos, qvel, values))
@@ -212,15 +212,9 @@ class Simulator:
             return
         mujoco.mj_step1(model, data)
         rotation = self._xmat
-        water_x, water_y, water_z = self._ocean.velocity(qpos[2])
-        wrench, advance = self._hydrodynamics.wrench(
-            rotation.ravel().tolist(),
-            (qvel[0] - water_x, qvel[1] - water_y, qvel[2] - water_z),
-            qvel[3:],
-            self._ocean.step(),
-            state,
-        )
-        self._mass += self._hydrodynamics.added_mass_rows(rotation)
+        water = self._ocean.velocity(qpos[2])
+        wrench, advance = self._hydrodynamics.wrench(rotation, self._qvel, water, self._ocean.step(), state)
+        self._hydrodynamics.add_mass(self._mass, rotation)
         mujoco.mj_factorM(model, data)
         self._applied[...] = wrench
         mujoco.mj_step2(model, data)

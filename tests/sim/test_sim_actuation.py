@@ -34,7 +34,7 @@ def test_lag_does_not_depend_on_the_step() -> None:
 
 def test_dead_band_and_saturation() -> None:
     actuators = make(100.0)
-    assert actuators.step([0.019, -0.019, 0.0, 0.0, 0.0, 0.019, 0.0])[:2] == [0.0, 0.0]
+    assert actuators.step([0.019, -0.019, 0.0, 0.0, 0.0, 0.019, 0.0])[:2].tolist() == [0.0, 0.0]
     # Fins have no dead band.
     assert actuators.state[5] == pytest.approx(0.019)
     assert actuators.step([5.0, -5.0, 0.021, math.inf, -math.inf, 9.0, -9.0]) == pytest.approx(
@@ -60,11 +60,11 @@ def test_power_of_a_hovering_thruster_is_that_of_an_actuator_disc() -> None:
     actuators = make(100.0)
     actuators.step([1.0] + [0.0] * 6)
     area = 0.25 * math.pi * 0.14**2
-    assert actuators.power_w([0.0] * 5) == pytest.approx(10.0**1.5 / math.sqrt(2.0 * 1025.0 * area), rel=1e-9)
+    assert actuators.power_w(np.zeros(5)) == pytest.approx(10.0**1.5 / math.sqrt(2.0 * 1025.0 * area), rel=1e-9)
     actuators.step([0.02] + [0.0] * 6)
-    assert actuators.power_w([3.0] * 5) == pytest.approx(0.2 * 3.0, rel=0.01)
+    assert actuators.power_w(np.full(5, 3.0)) == pytest.approx(0.2 * 3.0, rel=0.01)
     actuators.step([0.0] * 7)
-    assert actuators.power_w([3.0] * 5) == 0.0
+    assert actuators.power_w(np.full(5, 3.0)) == 0.0
 
 
 def test_power_is_never_negative() -> None:
@@ -72,7 +72,7 @@ def test_power_is_never_negative() -> None:
     actuators = make(100.0)
     for _ in range(500):
         actuators.step(rng.uniform(-1.0, 1.0, 7))
-        assert actuators.power_w(rng.uniform(-3.0, 3.0, 5).tolist()) >= 0.0
+        assert actuators.power_w(rng.uniform(-3.0, 3.0, 5)) >= 0.0
 
 
 def test_fin_turns_the_hull_the_way_it_stands_and_not_at_rest() -> None:

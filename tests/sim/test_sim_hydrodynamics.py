@@ -46,7 +46,7 @@ def test_wrench_is_fossens_formula_written_out() -> None:
     mass = REMUS.added_mass_body
     for _ in range(200):
         rotation, nu = random_rotation(rng), random_nu(rng)
-        gust = np.array([*rng.standard_normal(2), 0.0])
+        gust, water = np.array([*rng.standard_normal(2), 0.0]), rng.standard_normal(3)
         actuators = rng.uniform(-1.0, 1.0, 7)
         fins = np.where([actuator.kind == "fin" for actuator in REMUS.actuators], nu[0] * abs(nu[0]), 1.0)
         body = damping(nu) - coriolis_matrix(mass, nu) @ nu + REMUS.thruster_wrenches_body @ (actuators * fins)
@@ -54,11 +54,11 @@ def test_wrench_is_fossens_formula_written_out() -> None:
         expected = np.concatenate([rotation @ body[:3], body[3:]])
         expected[:3] += np.array([0.0, 0.0, REMUS.buoyancy_n]) + REMUS.buoyancy_n / 9.81 * gust
         got, advance = hydrodynamics.wrench(
-            rotation.ravel().tolist(),
-            (rotation @ nu[:3]).tolist(),
-            nu[3:].tolist(),
+            rotation,
+            np.concatenate([rotation @ nu[:3] + water, nu[3:]]),
+            (water[0], water[1], water[2]),
             (gust[0], gust[1]),
-            actuators.tolist(),
+            actuators,
         )
         np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-10)
         # Advance speed of the stern propeller is u, of the fore lateral (thrust to starboard) −(v + x r).
@@ -120,7 +120,9 @@ def test_added_mass_rows_turn_with_the_body() -> None:
     for _ in range(50):
         rotation, nu = random_rotation(rng), random_nu(rng)
         lower = np.zeros((6, 6))
-        lower[np.tril_indices(6)] = hydrodynamics.added_mass_rows(rotation)
+        rows = np.zeros(21)
+        hydrodynamics.add_mass(rows, rotation)
+        lower[np.tril_indices(6)] = rows
         mass = lower + lower.T - np.diag(np.diag(lower))
         joint = np.concatenate([rotation @ nu[:3], nu[3:]])
         assert joint @ mass @ joint == pytest.approx(nu @ REMUS.added_mass_body @ nu, rel=1e-12)
@@ -132,15 +134,13 @@ def test_mirror_image_gives_the_mirrored_wrench() -> None:
     hydrodynamics = Hydrodynamics(REMUS, (0,))
     mirror = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     sides = np.array([-1.0 if "lateral" in name or name == "rudder" else 1.0 for name in REMUS.actuator_names])
-    identity = np.eye(3).ravel().tolist()
+    identity, still = np.eye(3), (0.0, 0.0, 0.0)
     for _ in range(100):
         nu, actuators = random_nu(rng), rng.uniform(-1.0, 1.0, 7)
-        left = hydrodynamics.wrench(identity, nu[:3].tolist(), nu[3:].tolist(), (0.0, 0.0), actuators.tolist())[0]
+        left = hydrodynamics.wrench(identity, nu, still, (0.0, 0.0), actuators)[0]
         turned = mirror * nu
-        right = hydrodynamics.wrench(
-            identity, turned[:3].tolist(), turned[3:].tolist(), (0.0, 0.0), (sides * actuators).tolist()
-        )[0]
-        np.testing.assert_allclose(mirror * np.array(left), right, atol=1e-12)
+        right = hydrodynamics.wrench(identity, turned, still, (0.0, 0.0), sides * actuators)[0]
+        np.testing.assert_allclose(mirror * left, right, atol=1e-12)
 
 
 def test_lateral_thrusters_hold_a_cross_current_with_margin() -> None:
