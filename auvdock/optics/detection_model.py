@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.assets import asset
-from auvdock.core.arrays import Array, BoolArray, constant
+from auvdock.core.arrays import Array, BoolArray, IntArray
+from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
@@ -30,7 +31,7 @@ __all__ = [
 ]
 
 _ONES = np.ones(2)
-_ONE, _TEN, _VEILED_DN, _LEAST_DN = constant(1.0), constant(10.0), constant(50.0), constant(1e-3)
+_VEILED_DN, _LEAST_DN = 50.0, 1e-3
 _HAZE_PX = 20.0
 _GHOST_FLUX = 0.3
 """Flux of haze that breaks into spots, over that of the dimmest light (ours)."""
@@ -200,36 +201,30 @@ def draw_detections(
     alarms = rng.poisson(rate) if rate > 0.0 else 0
     merged = merge_close(seen, model)
     contrast = merged.contrast_dn
-    odds = merged.surround_dn * model.surround_factor
-    odds += model.contrast_50_dn
-    odds /= np.maximum(contrast, _LEAST_DN)
-    odds **= model.slope
     flash, ways = seen.flash, model.flash or _FLASH
-    if flash is not None:
-        odds[flash.place] = (ways.contrast_50_dn / max(float(contrast[flash.place]), 1e-3)) ** ways.slope
-    odds += _ONE
-    odds *= chance[0]
-    hit = odds < model.ceiling
-    hit &= contrast > _LEAST_DN
-    order = (-contrast).argsort(kind="stable")
-    index = order[hit[order]]
-    strength = contrast[index]
-    snr = strength / merged.noise_dn[index]
-    width = merged.width_px[index]
-    strength *= strength
-    spread = width * (model.centre_at_100 * 1e4 / strength)
-    spread *= spread
-    spread += model.centre_floor_px**2
-    centre = noise.take(index, 0)
-    centre *= np.sqrt(spread, out=spread)[:, None]
-    centre += merged.pixels.take(index, 0)
-    snr *= model.score_gain
-    score = snr / (snr + _TEN)
-    class_id = (merged.red[index] != (chance[1, index] < model.wrong_colour)).astype(np.int64)
-    half = np.maximum(merged.radius_px[index], width)[:, None]
-    if flash is not None and hit[flash.place]:
+    index = _found(
+        contrast,
+        merged.surround_dn,
+        chance[0],
+        (model.contrast_50_dn, model.surround_factor, model.slope, model.ceiling),
+        flash.place if flash is not None else -1,
+        (ways.contrast_50_dn, ways.slope),
+    )
+    index = index[(-contrast[index]).argsort(kind="stable")]
+    centre, half, score, class_id = _measured(
+        index,
+        merged.pixels,
+        contrast,
+        merged.noise_dn,
+        merged.width_px,
+        merged.radius_px,
+        merged.red,
+        noise,
+        chance[1],
+        (model.centre_at_100, model.centre_floor_px, model.score_gain, model.wrong_colour),
+    )
+    if flash is not None and flash.place in index:
         place = int(np.flatnonzero(index == flash.place)[0])
-        half = np.repeat(half, 2, axis=1)
         half[place] = np.maximum(half[place], ways.box_scale * flash.half_px)
         noise_over_contrast = 10.0 * float(merged.noise_dn[flash.place] / contrast[flash.place])
         spread_px = ways.centre_spread * noise_over_contrast * float(half[place].mean())
@@ -252,6 +247,60 @@ def draw_detections(
         if flux is not None:
             flux = np.concatenate([flux, np.full(alarms, _GHOST_FLUX * (float(flux.min()) if len(flux) else 1.0))])
     return Detections(xyxy, centre, score, class_id, flux)
+
+
+@compiled
+def _found(
+    contrast: Array,
+    surround: Array,
+    chance: Array,
+    model: tuple[float, float, float, float],
+    flash: int,
+    flash_model: tuple[float, float],
+) -> IntArray:
+    """(k,) lights of m that the detector finds; `flash` is the rotating beacon's place, -1 for none."""
+    contrast_50, surround_factor, slope, ceiling = model
+    found = np.empty(len(contrast), dtype=np.int64)
+    count = 0
+    for i in range(len(contrast)):
+        if contrast[i] <= _LEAST_DN:
+            continue
+        odds = ((contrast_50 + surround_factor * surround[i]) / contrast[i]) ** slope
+        if i == flash:
+            odds = (flash_model[0] / contrast[i]) ** flash_model[1]
+        if (1.0 + odds) * chance[i] < ceiling:
+            found[count] = i
+            count += 1
+    return found[:count]
+
+
+@compiled
+def _measured(
+    index: IntArray,
+    pixels: Array,
+    contrast: Array,
+    noise_dn: Array,
+    width_px: Array,
+    radius_px: Array,
+    red: BoolArray,
+    noise: Array,
+    chance: Array,
+    model: tuple[float, float, float, float],
+) -> tuple[Array, Array, Array, IntArray]:
+    """Centres and half sides (k, 2), scores and classes (k,) of the lights `index` (k,) of m."""
+    centre_at_100, centre_floor_px, score_gain, wrong_colour = model
+    centre, half = np.empty((len(index), 2)), np.empty((len(index), 2))
+    score, class_id = np.empty(len(index)), np.empty(len(index), dtype=np.int64)
+    for k in range(len(index)):
+        i = index[k]
+        spread = math.hypot(width_px[i] * centre_at_100 * 1e4 / contrast[i] ** 2, centre_floor_px)
+        for axis in range(2):
+            centre[k, axis] = pixels[i, axis] + spread * noise[i, axis]
+            half[k, axis] = max(radius_px[i], width_px[i])
+        snr = score_gain * contrast[i] / noise_dn[i]
+        score[k] = snr / (snr + 10.0)
+        class_id[k] = 1 if red[i] != (chance[i] < wrong_colour) else 0
+    return centre, half, score, class_id
 
 
 def squared_distances(pixels: Array) -> Array:

@@ -17,7 +17,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from auvdock.core.arrays import Array, IntArray, constant
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.compiled import compiled
 
 __all__ = ["HaloTable", "halo_table", "wells_transfer"]
 
@@ -26,7 +27,6 @@ _MIN_BR, _MAX_BR = 1e-3, 40.0
 _BINS_PER_UNIT, _BINS = 64, 4096
 _ANGLES = 192
 _MIN_T, _MAX_T = 1e-3, 200.0
-_LOWEST_BR, _HIGHEST_BR = constant(_MIN_BR), constant(0.999 * _MAX_BR)
 
 
 def wells_transfer(br: float, frequency_cycles_rad: Array, theta0_rad: float) -> Array:
@@ -45,8 +45,8 @@ class HaloTable:
         """Scale the universal table to an angle."""
         self.theta0_rad = theta0_rad
         log_br, self._log_t, self._log_density, self._encircled = _universal()
-        self._first = constant(float(log_br[0]))
-        self._per_step = constant(1.0 / float(log_br[1] - log_br[0]))
+        self._first = float(log_br[0])
+        self._per_step = 1.0 / float(log_br[1] - log_br[0])
 
     def density_rows(self, angle_rad: Array) -> Array:
         """(rows, m) halo per steradian at fixed angles (m,), one row per tabulated b r; see `row_of`."""
@@ -61,12 +61,7 @@ class HaloTable:
 
     def row_of(self, br: Array) -> tuple[IntArray, Array]:
         """Row (n,) below each b r (n,) and the weight (n,) of the row above: linear in log b r."""
-        place = np.log(np.minimum(np.maximum(br, _LOWEST_BR), _HIGHEST_BR))
-        place -= self._first
-        place *= self._per_step
-        row = place.astype(np.int64)
-        place -= row
-        return row, place
+        return _rows_of(br, self._first, self._per_step)
 
     def density(self, br: float, angle_rad: Array) -> Array:
         """(m,) halo per steradian at angles (m,) for one b r."""
@@ -81,6 +76,17 @@ class HaloTable:
         blend = rows[row[0]] * (1.0 - weight[0]) + rows[row[0] + 1] * weight[0]
         # Rows hold the halo per scattered energy, which itself is known exactly.
         return blend * -math.expm1(-br)
+
+
+@compiled
+def _rows_of(br: Array, first: float, per_step: float) -> tuple[IntArray, Array]:
+    """`HaloTable.row_of`."""
+    row, weight = np.empty(len(br), dtype=np.int64), np.empty(len(br))
+    for i in range(len(br)):
+        place = (math.log(min(max(br[i], _MIN_BR), 0.999 * _MAX_BR)) - first) * per_step
+        row[i] = int(place)
+        weight[i] = place - row[i]
+    return row, weight
 
 
 @lru_cache(maxsize=16)

@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from auvdock.core.arrays import Array, BoolArray, constant
+from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.camera import Camera
+from auvdock.core.compiled import compiled
 from auvdock.optics.settings import ImagingCfg
 
 __all__ = ["Lens"]
@@ -35,7 +36,6 @@ class Lens:
         self.shape = (rows, columns)
         k1, k2, p1, p2, k3 = (float(k) for k in camera.distortion)
         self._radial = (k1, k2, k3) if p1 == 0.0 and p2 == 0.0 else None
-        self._only_k1 = k2 == 0.0 and k3 == 0.0
         self._focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
         self._centre = np.array([camera.matrix[0, 2], camera.matrix[1, 2]])
         self._middle = np.array([(camera.width_px - 1) / 2, (camera.height_px - 1) / 2])
@@ -47,7 +47,6 @@ class Lens:
         corner = camera.normalise(np.array([[-0.5, -0.5], [last_x, last_y], [last_x, -0.5], [-0.5, last_y]]))
         self._max_tangent2 = float(np.max(np.sum(corner**2, axis=1)))
         self.max_tangent = math.sqrt(self._max_tangent2)
-        self._k1 = constant(k1)
         self._edges = self._edges_at(0.0)
 
     @cached_property
@@ -99,37 +98,47 @@ class Lens:
         folds back there.
         """
         limit, reach = self._edges if margin_px == 0.0 else self._edges_at(margin_px)
-        xy = rays[:, :2] / np.maximum(rays[:, 2:], _NO_DEPTH)
-        x2y2 = xy * xy
-        r2 = x2y2[:, 0] + x2y2[:, 1]
-        inside = r2 <= limit
-        inside &= rays[:, 2] > _ZERO
-        np.minimum(r2, limit, out=r2)
         if self._radial is not None:
-            # `Camera.project` without its tangential terms, at a third of its cost for a handful of points.
-            k1, k2, k3 = self._radial
-            radial = r2 * self._k1 if self._only_k1 else r2 * (k1 + r2 * (k2 + r2 * k3))
-            radial += _ONE
-            pixels = radial[:, None] * self._focal
-            pixels *= xy
-            pixels += self._centre
-        else:
-            pixels = self.camera.project(np.where(inside[:, None], rays, _AHEAD))
-        offset = pixels - self._middle
-        np.abs(offset, out=offset)
-        within = offset < reach
-        inside &= within[:, 0]
-        inside &= within[:, 1]
+            return _located(rays, limit, reach, self._radial, self._focal, self._centre, self._middle)
+        ahead = rays[:, 2] > 0.0
+        xy = rays[:, :2] / np.where(ahead, rays[:, 2], 1.0)[:, None]
+        inside = ahead & (np.sum(xy * xy, axis=1) <= limit)
+        pixels = self.camera.project(np.where(inside[:, None], rays, _AHEAD))
+        inside &= np.all(np.abs(pixels - self._middle) < reach, axis=1)
         return pixels, inside
 
-    def _edges_at(self, margin_px: float) -> tuple[Array, Array]:
-        """Greatest squared tangent to the optical axis () and offset from the image's middle (2,), with a margin."""
+    def _edges_at(self, margin_px: float) -> tuple[float, Array]:
+        """Greatest squared tangent to the optical axis and offset from the image's middle (2,), with a margin."""
         limit = self._max_tangent2 * (1.0 + margin_px * self.rad_per_px) ** 2
-        return constant(limit), self._middle + (0.5 + margin_px)
+        return limit, self._middle + (0.5 + margin_px)
 
 
 _AHEAD = np.array([0.0, 0.0, 1.0])
-_ZERO, _ONE, _NO_DEPTH = constant(0.0), constant(1.0), constant(1e-9)
+
+
+@compiled
+def _located(
+    rays: Array,
+    limit: float,
+    reach: Array,
+    radial: tuple[float, float, float],
+    focal: Array,
+    centre: Array,
+    middle: Array,
+) -> tuple[Array, BoolArray]:
+    """`Lens.locate` without tangential distortion: `Camera.project` at a fraction of its cost for a few points."""
+    pixels, inside = np.empty((len(rays), 2)), np.empty(len(rays), dtype=np.bool_)
+    k1, k2, k3 = radial
+    for i in range(len(rays)):
+        depth = max(rays[i, 2], 1e-9)
+        x, y = rays[i, 0] / depth, rays[i, 1] / depth
+        r2 = x * x + y * y
+        seen = r2 <= limit and rays[i, 2] > 0.0
+        r2 = min(r2, limit)
+        stretch = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        pixels[i, 0], pixels[i, 1] = focal[0] * stretch * x + centre[0], focal[1] * stretch * y + centre[1]
+        inside[i] = seen and abs(pixels[i, 0] - middle[0]) < reach[0] and abs(pixels[i, 1] - middle[1]) < reach[1]
+    return pixels, inside
 
 
 def _coarse_factor(width_px: int) -> int:

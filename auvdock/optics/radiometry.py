@@ -11,16 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.core.arrays import Array, constant
+from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconCfg, BeaconLayout
+from auvdock.core.compiled import compiled
 from auvdock.optics.bands import electrons_per_joule
 from auvdock.optics.light import peak_intensity_w_sr
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["LightSet", "Received"]
 
-_ONES = np.ones(3)
-_ONE, _MINUS_ONE, _NEAREST_M2 = constant(1.0), constant(-1.0), constant(1e-4)
+_NEAREST_M2 = 1e-4
 
 
 class Received(NamedTuple):
@@ -73,7 +73,6 @@ class LightSet:
         self.peak_w_sr = np.array([peak_intensity_w_sr(lamp) for lamp in lamps])
         self.flux_w = np.array([lamp.power_w * lamp.efficiency for lamp in lamps])
         half = np.radians([lamp.beam_angle_deg for lamp in lamps]) / 2.0
-        self._back = -self.axes
         self._minus_profile = -math.log(2.0) / half**2
         self.absorption_per_m = np.array([water.absorption_at(lamp.wavelength_nm) for lamp in lamps])
         self.scattering_per_m = np.array([water.scattering_at(lamp.wavelength_nm) for lamp in lamps])
@@ -94,22 +93,16 @@ class LightSet:
 
     def received(self, T_station_camera: Array) -> Received:
         """Core and halo irradiance of every lamp at a camera pose (4, 4)."""
+        ray, range_m, depth, total = _received(
+            T_station_camera,
+            self.positions_m,
+            self.axes,
+            self._minus_profile,
+            self.absorption_per_m,
+            self.scattering_per_m,
+            self.peak_w_sr,
+        )
         camera = T_station_camera[:3, 3]
-        offset = self.positions_m - camera
-        r2 = (offset * offset).dot(_ONES)
-        np.maximum(r2, _NEAREST_M2, out=r2)
-        r = np.sqrt(r2)
-        ray = offset / r[:, None]
-        cosine = (ray * self._back).dot(_ONES)
-        np.maximum(cosine, _MINUS_ONE, out=cosine)
-        np.minimum(cosine, _ONE, out=cosine)
-        angle = np.arccos(cosine, out=cosine)
-        exponent = self._minus_profile * angle
-        exponent *= angle
-        exponent -= self.absorption_per_m * r
-        total = np.exp(exponent, out=exponent)
-        total *= self.peak_w_sr
-        total /= r2
         ahead = float(camera[0]) - self._rim_x
         if ahead > 0.0 and self._behind:
             to_y, to_z = (camera[1:] - self._rim_centre).tolist()
@@ -118,6 +111,37 @@ class LightSet:
                 across, up = y * (1.0 - share) + to_y * share, z * (1.0 - share) + to_z * share
                 if across * across + up * up > self._rim_radius2:
                     total[index] = 0.0
-        depth = self.scattering_per_m * r
         core = total * np.exp(-depth)
-        return Received(ray.dot(T_station_camera[:3, :3]), r, depth, core, total - core)
+        return Received(ray, range_m, depth, core, total - core)
+
+
+@compiled
+def _received(
+    T_station_camera: Array,
+    positions_m: Array,
+    axes: Array,
+    minus_profile: Array,
+    absorption_per_m: Array,
+    scattering_per_m: Array,
+    peak_w_sr: Array,
+) -> tuple[Array, Array, Array, Array]:
+    """Rays in the camera frame (n, 3), ranges, scattering depths and irradiances (n,) that absorption leaves."""
+    count = len(positions_m)
+    ray, offset = np.empty((count, 3)), np.empty(3)
+    range_m, depth, total = np.empty(count), np.empty(count), np.empty(count)
+    for i in range(count):
+        r2 = along = 0.0
+        for k in range(3):
+            offset[k] = positions_m[i, k] - T_station_camera[k, 3]
+            r2 += offset[k] * offset[k]
+            along -= offset[k] * axes[i, k]
+        r2 = max(r2, _NEAREST_M2)
+        r = math.sqrt(r2)
+        angle = math.acos(min(max(along / r, -1.0), 1.0))
+        total[i] = peak_w_sr[i] * math.exp(minus_profile[i] * angle * angle - absorption_per_m[i] * r) / r2
+        range_m[i], depth[i] = r, scattering_per_m[i] * r
+        for k in range(3):
+            ray[i, k] = 0.0
+            for axis in range(3):
+                ray[i, k] += offset[axis] / r * T_station_camera[axis, k]
+    return ray, range_m, depth, total

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.core.arrays import Array, IntArray, constant
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.compiled import compiled
 from auvdock.optics.halo import halo_table
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet, Received
@@ -17,9 +18,8 @@ from auvdock.optics.water import WaterCfg
 __all__ = ["FlashLines", "SpotModel", "Spots"]
 
 _RADII = 32
-_TWO_PI = constant(2.0 * math.pi)
-_ZERO, _HALF, _ONE, _TWO = constant(0.0), constant(0.5), constant(1.0), constant(2.0)
-_LAST = np.array(_RADII - 1)
+_LEAST_EXPONENT = -60.0
+"""Of a Gaussian; what is left there is below the rounding of any halo."""
 
 
 class FlashLines(NamedTuple):
@@ -71,16 +71,13 @@ class SpotModel:
         edges = np.concatenate([[0.0], np.sqrt(self.radii_px[1:] * self.radii_px[:-1]), self.radii_px[-1:]])
         self.ring_px2 = math.pi * np.diff(edges**2)
         self._minus_half_r2 = -0.5 * self.radii_px**2
-        first2 = float(self.radii_px[0]) ** 2
-        self._first2, self._log_first2 = constant(first2), constant(math.log(first2))
-        self._per_log2 = constant(0.5 / math.log(self.radii_px[1] / self.radii_px[0]))
-        self._starts = np.arange(0, lights.count * _RADII, _RADII)
+        self._first2 = float(self.radii_px[0]) ** 2
+        self._per_log2 = 0.5 / math.log(self.radii_px[1] / self.radii_px[0])
         table = halo_table(water.scattering_angle_rad)
         self._table = table
         self._rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
-        self._rises = np.diff(self._rows, axis=0)
-        self._lens_sigma2 = constant(cfg.lens_sigma_px**2)
-        self._lamp_px_m2 = constant((cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2)
+        self._lens_sigma2 = cfg.lens_sigma_px**2
+        self._lamp_px_m2 = (cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2
         self._channel = lights.electrons_per_j * lens.aperture_m2
         self._samples = lens.camera.width_px * lens.camera.height_px * 3
 
@@ -90,27 +87,24 @@ class SpotModel:
 
     def spots(self, received: Received, index: IntArray) -> Spots:
         """Profiles of the lights `index` (m,)."""
-        core, halo, range_m = received.core_w_m2[index], received.halo_w_m2[index], received.range_m[index]
-        sigma2 = self._lamp_px_m2 / (range_m * range_m)
-        sigma2 += self._lens_sigma2
         row, weight = self._table.row_of(received.scattering_depth[index])
-        profile = self._rises.take(row, 0)
-        profile *= weight[:, None]
-        profile += self._rows.take(row, 0)
-        profile *= halo[:, None]
-        gauss = self._minus_half_r2 / sigma2[:, None]
-        np.exp(gauss, out=gauss)
-        gauss *= (core / (_TWO_PI * sigma2))[:, None]
-        profile += gauss
-        return Spots(core, halo, np.sqrt(sigma2), profile, self._channel.take(index, 0))
+        core, halo = received.core_w_m2[index], received.halo_w_m2[index]
+        sigma, profile = _profiles(
+            core,
+            halo,
+            received.range_m[index],
+            row,
+            weight,
+            self._rows,
+            self._minus_half_r2,
+            self._lens_sigma2,
+            self._lamp_px_m2,
+        )
+        return Spots(core, halo, sigma, profile, self._channel.take(index, 0))
 
     def saturated_area_px2(self, spots: Spots, level_e_s: float) -> Array:
         """(m, 3) area of each spot above a level in electrons per second, per channel; overlap is not counted."""
-        level = spots.profile[:, None, :] * (spots.channel * (2.5 / level_e_s))[:, :, None]
-        level -= _TWO
-        np.maximum(level, _ZERO, out=level)
-        np.minimum(level, _ONE, out=level)
-        return level @ self.ring_px2
+        return _areas(spots.profile, spots.channel, 2.5 / level_e_s, self.ring_px2)
 
     def share(self, area_px2: Array) -> float:
         """Share of the image's samples that areas (m, 3) are."""
@@ -121,11 +115,55 @@ class SpotModel:
 
         Taken at the nearest tabulated radius; the radii are 22 % apart.
         """
-        place = np.log(np.maximum(distance2_px2, self._first2))
-        place -= self._log_first2
-        place *= self._per_log2
-        place += _HALF
-        index = place.astype(np.int64)
-        np.minimum(index, _LAST, out=index)
-        index += self._starts[: len(index)]
-        return spots.profile.take(index)
+        return _at_distance(spots.profile, distance2_px2, self._first2, self._per_log2)
+
+
+@compiled
+def _profiles(
+    core: Array,
+    halo: Array,
+    range_m: Array,
+    row: IntArray,
+    weight: Array,
+    rows: Array,
+    minus_half_r2: Array,
+    lens_sigma2: float,
+    lamp_px_m2: float,
+) -> tuple[Array, Array]:
+    """Widths (m,) and profiles (m, k) of spots."""
+    sigma, profile = np.empty(len(core)), np.empty((len(core), len(minus_half_r2)))
+    for i in range(len(core)):
+        sigma2 = lens_sigma2 + lamp_px_m2 / (range_m[i] * range_m[i])
+        sigma[i] = math.sqrt(sigma2)
+        peak = core[i] / (2.0 * math.pi * sigma2)
+        below, above = rows[row[i]], rows[row[i] + 1]
+        for k in range(len(minus_half_r2)):
+            profile[i, k] = (below[k] + weight[i] * (above[k] - below[k])) * halo[i]
+            exponent = minus_half_r2[k] / sigma2
+            if exponent > _LEAST_EXPONENT:
+                profile[i, k] += peak * math.exp(exponent)
+    return sigma, profile
+
+
+@compiled
+def _areas(profile: Array, channel: Array, scale: float, ring_px2: Array) -> Array:
+    """`SpotModel.saturated_area_px2`: of each ring the part between 0 and 1 by which it is above the level."""
+    area = np.zeros((len(profile), 3))
+    for i in range(len(profile)):
+        for c in range(3):
+            per_w = channel[i, c] * scale
+            for k in range(len(ring_px2)):
+                area[i, c] += min(max(profile[i, k] * per_w - 2.0, 0.0), 1.0) * ring_px2[k]
+    return area
+
+
+@compiled
+def _at_distance(profile: Array, distance2_px2: Array, first2: float, per_log2: float) -> Array:
+    """`SpotModel.at_distance`."""
+    value = np.empty(distance2_px2.shape)
+    last = profile.shape[1] - 1
+    for i in range(value.shape[0]):
+        for j in range(value.shape[1]):
+            place = math.log(max(distance2_px2[i, j], first2) / first2) * per_log2
+            value[i, j] = profile[j, min(int(place + 0.5), last)]
+    return value
