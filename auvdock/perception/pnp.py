@@ -16,20 +16,18 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import get_lapack_funcs
 
-from auvdock.core.arrays import Array, constant
+from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.errors import ConfigError
+from auvdock.perception.pnp_refine import attitude_weight, pose_covariance, refine, rotation_of
 
 __all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "translation_from_rotation"]
 
-_posv, _potrf, _potrs = get_lapack_funcs(("posv", "potrf", "potrs"), dtype=np.float64)
-_MAX_ITERATIONS = 20
 _DECREMENT = 1e-9
 _DECREMENT_TRACKED = 1e-4
-_IDENTITY, _EYE_3 = np.eye(6), np.eye(3)
-_HALF, _ONE = constant(0.5), constant(1.0)
+_EYE_3 = np.eye(3)
+_NO_VECTOR, _NO_WEIGHT = np.zeros(3), np.zeros((3, 3))
 
 
 @dataclass(frozen=True)
@@ -95,20 +93,7 @@ class PnpSolution(NamedTuple):
         With Σ = (JᵀWJ)⁻¹ over (r, t), δ = J_l(r) dr a small rotation of the camera axes: d(position) =
         -Rᵀ (dt + t × δ), and the camera turns by -δ.
         """
-        left = _left_jacobian(self.rotation_vector)
-        x, y, z = self.translation_m.tolist()
-        skew = np.array((0.0, -z, y, z, 0.0, -x, -y, x, 0.0)).reshape(3, 3)
-        to = np.zeros((6, 6))
-        back = -self.rotation.T
-        to[:3, :3] = back.dot(skew).dot(left)
-        to[:3, 3:] = back
-        np.negative(left, out=to[3:, :3])
-        half, _ = _potrs(self.normal, to.T, lower=1)
-        covariance = to.dot(half)
-        symmetric = covariance.T.copy()
-        symmetric += covariance
-        symmetric *= _HALF
-        return symmetric
+        return pose_covariance(self.rotation_vector, self.rotation, self.translation_m, self.normal)
 
 
 class PnpSolver:
@@ -213,56 +198,19 @@ class PnpSolver:
             pose, decrement = np.concatenate([start.rotation_vector, start.translation_m]), _DECREMENT_TRACKED
         else:
             pose, decrement = np.concatenate(start), _DECREMENT
-        weight = (_ONE / sigma).repeat(2)
-        column = weight[:, None]
-        target = pixels.reshape(-1)
-        attitude = self._prior_terms(prior) if self._prior_weight else None
-        damping, cost, trial, factor = 0.0, math.inf, pose, _IDENTITY
-        normal, gradient, residual, pull = _IDENTITY, pose, target, None
-        for _ in range(_MAX_ITERATIONS):
-            image, jacobian = cv2.projectPoints(points, trial[:3], trial[3:], self._matrix, self._distortion)
-            difference = image.reshape(-1) - target
-            weighted = weight * difference
-            trial_cost = float(weighted.dot(weighted))
-            if attitude is not None:
-                offset = trial[:3] - attitude[0]
-                pull = attitude[1].dot(offset)
-                trial_cost += float(offset.dot(pull))
-            if not math.isfinite(trial_cost):
-                return None
-            if trial_cost <= cost:
-                pose, cost, residual, damping = trial, trial_cost, difference, damping * 0.1
-                scaled = column * jacobian[:, :6]
-                normal, gradient = scaled.T.dot(scaled), scaled.T.dot(weighted)
-                if attitude is not None and pull is not None:
-                    turning, torque = normal[:3, :3], gradient[:3]
-                    turning += attitude[1]
-                    torque += pull
-            else:
-                damping = max(10.0 * damping, 1e-3)
-            damped = normal + np.diag(damping * normal.diagonal()) if damping > 1e-9 else normal
-            factor, step, info = _posv(damped, gradient, lower=1)
-            if info:
-                damping = max(10.0 * damping, 1e-3)
-                continue
-            trial = pose - step
-            # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
-            if float(gradient.dot(step)) < decrement and damping <= 1e-9:
-                pose = trial
-                break  # undamped, so the factor is that of the normal matrix itself
-        else:
-            factor, info = _potrf(normal, lower=1)
-            if info:
-                return None
-        if pose[5] <= 0.0:
+        expected, weight = self._prior_terms(prior)
+        good, pose, residual, factor, cost = refine(
+            pose, points, pixels, sigma, self._matrix, self._distortion, expected, weight, decrement
+        )
+        if not good:
             return None
-        rotation = _rodrigues(pose[:3])
+        rotation = rotation_of(pose[:3])
         cosine = (float(np.vdot(rotation, prior)) - 1.0) / 2.0
         return PnpSolution(
             rotation_vector=pose[:3],
             rotation=rotation,
             translation_m=pose[3:],
-            residual_px=np.hypot(residual[0::2], residual[1::2]),
+            residual_px=np.hypot(residual[:, 0], residual[:, 1]),
             normal=factor,
             attitude_error_rad=math.acos(max(-1.0, min(1.0, cosine))),
             cost=cost,
@@ -270,23 +218,16 @@ class PnpSolver:
         )
 
     def _prior_terms(self, prior: Array) -> tuple[Array, Array]:
-        """Rotation vector r of the prior and w J_lᵀ J_l = w [A I + (1 − A) r̂ r̂ᵀ], A = 2 (1 − cos |r|) / |r|²."""
+        """The prior's rotation vector (3,) and its weight J_lᵀ W J_l (3, 3), W that of a small rotation; or zeros."""
+        if not self._prior_weight:
+            return _NO_VECTOR, _NO_WEIGHT
         vector = _rodrigues(prior).ravel()
+        weights = self._prior_weight * _EYE_3
         if self.heading_sigma_rad is not None:
             up = prior[:, 2]
             heading_weight = min(1.0 / self.heading_sigma_rad**2, self._prior_weight)
-            weights = self._prior_weight * _EYE_3 + (heading_weight - self._prior_weight) * np.outer(up, up)
-            left = _left_jacobian(vector)
-            return vector, left.T @ weights @ left
-        x, y, z = vector.tolist()
-        square = x * x + y * y + z * z
-        if square < 1e-16:
-            return vector, self._prior_weight * np.eye(3)
-        across = self._prior_weight * 2.0 * (1.0 - math.cos(math.sqrt(square))) / square
-        along = (self._prior_weight - across) / square
-        xy, xz, yz = along * x * y, along * x * z, along * y * z
-        xx, yy, zz = across + along * x * x, across + along * y * y, across + along * z * z
-        return vector, np.array((xx, xy, xz, xy, yy, yz, xz, yz, zz)).reshape(3, 3)
+            weights += (heading_weight - self._prior_weight) * np.outer(up, up)
+        return vector, attitude_weight(vector, weights)
 
 
 def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Array | None:
@@ -314,22 +255,3 @@ def _rodrigues(rotation: Array) -> Array:
 
 def _vector(column: NDArray[Any]) -> Array:
     return np.asarray(column, dtype=np.float64).ravel()
-
-
-def _left_jacobian(vector: Array) -> Array:
-    """(3, 3) J_l with exp([r + dr]) = exp([J_l dr]) exp([r]) to first order (Barfoot 2017, equation 7.77)."""
-    x, y, z = vector.tolist()
-    angle = math.sqrt(x * x + y * y + z * z)
-    if angle < 1e-8:
-        return np.eye(3)
-    sine = math.sin(angle) / angle
-    a, b = x / angle, y / angle
-    c = z / angle
-    k = 1.0 - sine
-    h = (1.0 - math.cos(angle)) / angle
-    rows = (
-        *(sine + k * a * a, k * a * b - h * c, k * a * c + h * b),
-        *(k * a * b + h * c, sine + k * b * b, k * b * c - h * a),
-        *(k * a * c - h * b, k * b * c + h * a, sine + k * c * c),
-    )
-    return np.array(rows).reshape(3, 3)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from auvdock.core.arrays import Array, BoolArray, IntArray, constant
+from auvdock.core.arrays import Array, BoolArray, IntArray
+from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.perception.views import TrackViews
@@ -19,8 +20,6 @@ from auvdock.perception.views import TrackViews
 __all__ = ["LightTracker", "TrackerCfg"]
 
 _UNMATCHED_COST = 40.0
-_NONE = np.zeros(0, dtype=np.int64)
-_LEAST_SCORE, _ONE, _TWO = constant(0.1), constant(1.0), constant(2.0)
 
 
 @dataclass(frozen=True)
@@ -79,11 +78,8 @@ class LightTracker:
     def __init__(self, cfg: TrackerCfg, rate_hz: float, width_px: int, height_px: int) -> None:
         """Precompute the filter's constants for a camera's rate and size."""
         self._cfg = cfg
-        dt, power = 1.0 / rate_hz, cfg.acceleration_px_s2**2
-        self._dt = constant(dt)
-        self._q = constant(0.25 * dt**4 * power), constant(0.5 * dt**3 * power), constant(dt**2 * power)
-        self._gate = constant(cfg.gate_sigmas**2)
-        self._variance = constant(cfg.pixel_sigma_px**2)
+        self._dt = 1.0 / rate_hz
+        self._limits = (cfg.confirm_hits, cfg.max_predicted_frames, cfg.max_tentative_frames)
         margin = 0.1
         self._low = np.array([-margin * width_px, -margin * height_px])
         self._high = np.array([(1.0 + margin) * width_px, (1.0 + margin) * height_px])
@@ -107,33 +103,24 @@ class LightTracker:
         """Advance one frame: predict, assign, correct, start new tracks, end old ones."""
         cfg = self._cfg
         self._slot = (self._slot + 1) % cfg.window_frames
-        n, m = len(self.state), len(detections)
-        variance = self._variance / (detections.score + _LEAST_SCORE)
-        paired: IntArray = _NONE
-        if n:
-            self._predict()
-            matched = self.detection
-            matched.fill(-1)
-            if m:
-                rows, paired = self._assign(detections, variance)
-                matched[rows] = paired
-            if len(paired) == n:
-                self._correct(matched, None, detections, variance)
-                self.hits += 1
-                self.missed.fill(0)
-                self.history[:, self._slot] = detections.score[matched]
-            else:
-                hit = matched >= 0
-                if m:
-                    self._correct(matched, hit, detections, variance)
-                self.hits += hit
-                self.missed += 1
-                self.missed[hit] = 0
-                self.history[:, self._slot] = np.where(hit, detections.score[matched], 0.0) if m else 0.0
-                self._bury()
-        if len(paired) < m:
-            free = np.ones(m, dtype=np.bool_)
-            free[paired] = False
+        centre, score = detections.centre_px, detections.score
+        variance = cfg.pixel_sigma_px**2 / (score + 0.1)
+        if len(self.state):
+            _predict(self.state, self.covariance, self._dt, cfg.acceleration_px_s2**2)
+            distance = _distances(
+                self.state, self.covariance, self.class_id, centre, detections.class_id, variance, cfg.gate_sigmas**2
+            )
+            matched = self._labels[:, 5]
+            if not _only_pairs(distance, matched):
+                self._assign(distance, variance, matched)
+            _correct(self.state, self.covariance, matched, centre, variance)
+            _count(self._labels, self.history, self._slot, score)
+            alive = _alive(self._labels, self.state, self._limits, self._low, self._high)
+            if not alive.all():
+                self._keep(alive)
+        free = np.ones(len(score), dtype=np.bool_)
+        free[self.detection[self.detection >= 0]] = False
+        if free.any():
             self._start(free, detections, variance)
 
     def position_sigma_px(self) -> Array:
@@ -155,62 +142,16 @@ class LightTracker:
     def _bind(self) -> None:
         self.track_id, self.class_id, self.beacon_id, self.missed, self.hits, self.detection = self._labels.T
 
-    def _predict(self) -> None:
-        dt, (q00, q01, q11) = self._dt, self._q
-        p00, p01, p11 = self.covariance.T
-        place = self.state[:, :2]
-        place += dt * self.state[:, 2:]
-        moved = dt * p11
-        spread = _TWO * p01
-        spread += moved
-        spread *= dt
-        spread += q00
-        p00 += spread
-        moved += q01
-        p01 += moved
-        p11 += q11
-
-    def _assign(self, detections: Detections, variance: Array) -> tuple[IntArray, IntArray]:
-        gap = self.state[:, None, :2] - detections.centre_px
+    def _assign(self, distance: Array, variance: Array, matched: IntArray) -> None:
+        """The Hungarian method, where several could be paired."""
+        allowed = np.isfinite(distance)
         spread = self.covariance[:, :1] + variance
-        gap *= gap
-        distance = gap[:, :, 0] + gap[:, :, 1]
-        distance /= spread
-        allowed = self.class_id[:, None] == detections.class_id
-        allowed &= distance <= self._gate
-        rows, columns = allowed.nonzero()
-        if len(set(columns.tolist())) == len(rows) == len(set(rows.tolist())):
-            return rows, columns  # nobody competes: the Hungarian method would find the same
         # A stale track has a wide gate: the log term keeps it from taking the detection of a sharp one.
         cost = np.where(allowed, distance + 2.0 * np.log(spread / variance), _UNMATCHED_COST)
         rows, columns = linear_sum_assignment(cost)
         kept = allowed[rows, columns]
-        return rows[kept], columns[kept]
-
-    def _correct(self, matched: IntArray, hit: BoolArray | None, detections: Detections, variance: Array) -> None:
-        """Kalman correction of the tracks `hit`, all if None."""
-        p00, p01, p11 = self.covariance.T
-        spread = variance[matched]
-        spread += p00
-        inverse = np.divide(_ONE if hit is None else hit, spread, out=spread)
-        gain_0, gain_1 = p00 * inverse, p01 * inverse
-        place, speed = self.state[:, :2], self.state[:, 2:]
-        innovation = detections.centre_px.take(matched, 0)
-        innovation -= place
-        place += gain_0[:, None] * innovation
-        speed += gain_1[:, None] * innovation
-        p11 -= gain_1 * p01
-        rest = np.subtract(_ONE, gain_0, out=gain_0)
-        p01 *= rest
-        p00 *= rest
-
-    def _bury(self) -> None:
-        cfg = self._cfg
-        limit = np.where(self.hits >= cfg.confirm_hits, cfg.max_predicted_frames, cfg.max_tentative_frames)
-        centre = self.state[:, :2]
-        alive = (self.missed <= limit) & ((centre > self._low) & (centre < self._high)).all(axis=1)
-        if not alive.all():
-            self._keep(alive)
+        matched.fill(-1)
+        matched[rows[kept]] = columns[kept]
 
     def _keep(self, alive: BoolArray) -> None:
         self.state, self.covariance = self.state.compress(alive, 0), self.covariance.compress(alive, 0)
@@ -239,3 +180,101 @@ class LightTracker:
         self.history = np.concatenate([self.history, history])
         self._labels = np.concatenate([self._labels, labels])
         self._bind()
+
+
+@compiled
+def _predict(state: Array, covariance: Array, dt: float, power: float) -> None:
+    """F x and F P Fᵀ + Q of all tracks, in place."""
+    for i in range(len(state)):
+        for axis in range(2):
+            state[i, axis] += dt * state[i, 2 + axis]
+        p01, p11 = covariance[i, 1], covariance[i, 2]
+        covariance[i, 0] += dt * (2.0 * p01 + dt * p11) + 0.25 * dt**4 * power
+        covariance[i, 1] += dt * p11 + 0.5 * dt**3 * power
+        covariance[i, 2] += dt**2 * power
+
+
+@compiled
+def _distances(
+    state: Array,
+    covariance: Array,
+    class_id: IntArray,
+    centre: Array,
+    centre_class: IntArray,
+    variance: Array,
+    gate: float,
+) -> Array:
+    """(n, m) d² / S of tracks and detections; `inf` beyond the gate and between classes."""
+    distance = np.full((len(state), len(centre)), np.inf)
+    for i in range(len(state)):
+        for j in range(len(centre)):
+            if class_id[i] != centre_class[j]:
+                continue
+            x, y = state[i, 0] - centre[j, 0], state[i, 1] - centre[j, 1]
+            value = (x * x + y * y) / (covariance[i, 0] + variance[j])
+            if value <= gate:
+                distance[i, j] = value
+    return distance
+
+
+@compiled
+def _only_pairs(distance: Array, matched: IntArray) -> bool:
+    """Put each track's detection, -1 for none, into `matched`; False where several compete for one.
+
+    Where nobody competes the Hungarian method would find the same.
+    """
+    taken = np.zeros(distance.shape[1], dtype=np.bool_)
+    matched[:] = -1
+    for i in range(distance.shape[0]):
+        for j in range(distance.shape[1]):
+            if distance[i, j] == np.inf:
+                continue
+            if matched[i] >= 0 or taken[j]:
+                return False
+            matched[i], taken[j] = j, True
+    return True
+
+
+@compiled
+def _correct(state: Array, covariance: Array, matched: IntArray, centre: Array, variance: Array) -> None:
+    """Kalman correction of the tracks that have a detection, in place."""
+    for i in range(len(state)):
+        j = matched[i]
+        if j < 0:
+            continue
+        p00, p01 = covariance[i, 0], covariance[i, 1]
+        gain_0, gain_1 = p00 / (p00 + variance[j]), p01 / (p00 + variance[j])
+        for axis in range(2):
+            innovation = centre[j, axis] - state[i, axis]
+            state[i, axis] += gain_0 * innovation
+            state[i, 2 + axis] += gain_1 * innovation
+        covariance[i, 2] -= gain_1 * p01
+        covariance[i, 1] *= 1.0 - gain_0
+        covariance[i, 0] *= 1.0 - gain_0
+
+
+@compiled
+def _count(labels: IntArray, history: Array, slot: int, score: Array) -> None:
+    """Count hits and missed frames, and keep the score."""
+    for i in range(len(labels)):
+        j = labels[i, 5]
+        if j >= 0:
+            labels[i, 3] = 0
+            labels[i, 4] += 1
+            history[i, slot] = score[j]
+        else:
+            labels[i, 3] += 1
+            history[i, slot] = 0.0
+
+
+@compiled
+def _alive(labels: IntArray, state: Array, limits: tuple[int, int, int], low: Array, high: Array) -> BoolArray:
+    """(n,) tracks that go on: not missed for longer than allowed, and not far outside the image.
+
+    A track of `limits[0]` detections or more outlives `limits[1]` frames without one, others `limits[2]`.
+    """
+    alive = np.empty(len(labels), dtype=np.bool_)
+    for i in range(len(labels)):
+        most = limits[1] if labels[i, 4] >= limits[0] else limits[2]
+        alive[i] = labels[i, 3] <= most and low[0] < state[i, 0] < high[0] and low[1] < state[i, 1] < high[1]
+    return alive

@@ -1,0 +1,267 @@
+"""Levenberg–Marquardt on the reprojection error, and the covariance of its result: the loops of `perception.pnp`.
+
+With y = R X + t, R = exp([r]): ∂y/∂t = 1 and ∂y/∂r = -[R X] J_l(r), J_l the left Jacobian of the rotation group
+(Barfoot 2017, equation 7.77). The image of y is OpenCV's: pinhole, three radial and two tangential terms.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
+
+__all__ = ["attitude_weight", "left_jacobian", "pose_covariance", "refine", "rotation_of"]
+
+_MAX_ITERATIONS = 20
+
+
+@compiled
+def refine(
+    pose: Array,
+    points: Array,
+    pixels: Array,
+    sigma: Array,
+    matrix: Array,
+    distortion: Array,
+    prior: Array,
+    prior_weight: Array,
+    decrement: float,
+) -> tuple[bool, Array, Array, Array, float]:
+    """Refine a pose (r, t) (6,) on the weighted reprojection error and a prior of r.
+
+    Args:
+        pose: start.
+        points: (n, 3) in the station frame.
+        pixels: (n, 2) their images.
+        sigma: (n,) standard deviation of an image point per axis.
+        matrix: (3, 3) of the camera.
+        distortion: (5,) k1, k2, p1, p2, k3.
+        prior: (3,) rotation vector.
+        prior_weight: (3, 3) W of its cost (r - prior)ᵀ W (r - prior), zeros for none.
+        decrement: expected fall of χ² at which to stop.
+
+    Returns:
+        Whether it ended well; the pose; residuals (n, 2) of the last pose that was evaluated; lower Cholesky factor
+        (6, 6) of JᵀWJ, prior included; χ².
+    """
+    count = len(points)
+    best, trial = pose.copy(), pose.copy()
+    residual, difference = np.zeros((count, 2)), np.zeros((count, 2))
+    jacobian = np.zeros((count, 2, 6))
+    normal, gradient, factor = np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6))
+    damping, cost = 0.0, math.inf
+    for _ in range(_MAX_ITERATIONS):
+        _project(trial, points, matrix, distortion, difference, jacobian)
+        trial_cost = 0.0
+        for i in range(count):
+            for axis in range(2):
+                difference[i, axis] -= pixels[i, axis]
+                trial_cost += (difference[i, axis] / sigma[i]) ** 2
+        for i in range(3):
+            for j in range(3):
+                trial_cost += (trial[i] - prior[i]) * prior_weight[i, j] * (trial[j] - prior[j])
+        if not math.isfinite(trial_cost):
+            return False, best, residual, factor, cost
+        if trial_cost <= cost:
+            best[:], residual[:] = trial, difference
+            cost = trial_cost
+            damping *= 0.1
+            _normal_equations(jacobian, difference, sigma, best, prior, prior_weight, normal, gradient)
+        else:
+            damping = max(10.0 * damping, 1e-3)
+        factor[:] = normal
+        if damping > 1e-9:
+            for i in range(6):
+                factor[i, i] += damping * normal[i, i]
+        if not _cholesky(factor):
+            damping = max(10.0 * damping, 1e-3)
+            continue
+        step = gradient.copy()
+        _substitute(factor, step)
+        trial[:] = best - step
+        # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
+        if np.sum(gradient * step) < decrement and damping <= 1e-9:
+            # Undamped, so the factor is that of the normal matrix itself.
+            return trial[5] > 0.0, trial, residual, factor, cost
+    factor[:] = normal
+    return _cholesky(factor) and best[5] > 0.0, best, residual, factor, cost
+
+
+@compiled
+def _normal_equations(
+    jacobian: Array,
+    difference: Array,
+    sigma: Array,
+    pose: Array,
+    prior: Array,
+    prior_weight: Array,
+    normal: Array,
+    gradient: Array,
+) -> None:
+    """Put JᵀWJ and JᵀW times the residuals, prior included, into `normal` (6, 6) and `gradient` (6,)."""
+    normal[:], gradient[:] = 0.0, 0.0
+    normal[:3, :3] = prior_weight
+    for i in range(3):
+        for j in range(3):
+            gradient[i] += prior_weight[i, j] * (pose[j] - prior[j])
+    for k in range(len(sigma)):
+        weight = 1.0 / sigma[k] ** 2
+        for axis in range(2):
+            row = jacobian[k, axis]
+            for i in range(6):
+                gradient[i] += weight * row[i] * difference[k, axis]
+                for j in range(i + 1):
+                    normal[i, j] += weight * row[i] * row[j]
+    for i in range(6):
+        for j in range(i):
+            normal[j, i] = normal[i, j]
+
+
+@compiled
+def _project(pose: Array, points: Array, matrix: Array, distortion: Array, image: Array, jacobian: Array) -> None:
+    """Put the pixels (n, 2) of points (n, 3) under a pose (6,) into `image`, their derivatives into (n, 2, 6)."""
+    rotation, left = rotation_of(pose[:3]), left_jacobian(pose[:3])
+    k1, k2, p1, p2, k3 = distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]
+    turned, by_r, by_y = np.empty(3), np.empty((3, 3)), np.zeros((2, 3))
+    for n in range(len(points)):
+        for i in range(3):
+            turned[i] = rotation[i, 0] * points[n, 0] + rotation[i, 1] * points[n, 1] + rotation[i, 2] * points[n, 2]
+        depth = turned[2] + pose[5]
+        per_m = 1.0 / depth if depth != 0.0 else 1.0
+        x, y = (turned[0] + pose[3]) * per_m, (turned[1] + pose[4]) * per_m
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        rise = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2)
+        image[n, 0] = matrix[0, 0] * (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)) + matrix[0, 2]
+        image[n, 1] = matrix[1, 1] * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + matrix[1, 2]
+        xx = matrix[0, 0] * (radial + 2.0 * x * x * rise + 2.0 * p1 * y + 6.0 * p2 * x) * per_m
+        yy = matrix[1, 1] * (radial + 2.0 * y * y * rise + 6.0 * p1 * y + 2.0 * p2 * x) * per_m
+        cross = (2.0 * x * y * rise + 2.0 * p1 * x + 2.0 * p2 * y) * per_m
+        by_y[0, 0], by_y[0, 1] = xx, matrix[0, 0] * cross
+        by_y[1, 0], by_y[1, 1] = matrix[1, 1] * cross, yy
+        for axis in range(2):
+            by_y[axis, 2] = -by_y[axis, 0] * x - by_y[axis, 1] * y
+        # -[R X] J_l, column by column.
+        for j in range(3):
+            by_r[0, j] = turned[2] * left[1, j] - turned[1] * left[2, j]
+            by_r[1, j] = turned[0] * left[2, j] - turned[2] * left[0, j]
+            by_r[2, j] = turned[1] * left[0, j] - turned[0] * left[1, j]
+        for axis in range(2):
+            for j in range(3):
+                jacobian[n, axis, j] = (
+                    by_y[axis, 0] * by_r[0, j] + by_y[axis, 1] * by_r[1, j] + by_y[axis, 2] * by_r[2, j]
+                )
+                jacobian[n, axis, 3 + j] = by_y[axis, j]
+
+
+@compiled
+def pose_covariance(vector: Array, rotation: Array, translation: Array, factor: Array) -> Array:
+    """(6, 6) covariance of (camera position in the station frame, small rotation in the camera frame).
+
+    With Σ = (JᵀWJ)⁻¹ over (r, t), δ = J_l(r) dr a small rotation of the camera axes: d(position) =
+    -Rᵀ (dt + t × δ), and the camera turns by -δ.
+
+    Args:
+        vector: (3,) r.
+        rotation: (3, 3) R.
+        translation: (3,) t.
+        factor: (6, 6) lower Cholesky factor of JᵀWJ.
+    """
+    left = left_jacobian(vector)
+    x, y, z = translation[0], translation[1], translation[2]
+    to = np.zeros((6, 6))
+    for j in range(3):
+        a, b, c = y * left[2, j] - z * left[1, j], z * left[0, j] - x * left[2, j], x * left[1, j] - y * left[0, j]
+        for i in range(3):
+            to[i, j] = -(rotation[0, i] * a + rotation[1, i] * b + rotation[2, i] * c)
+            to[i, 3 + j] = -rotation[j, i]
+            to[3 + i, j] = -left[i, j]
+    # With L Lᵀ = JᵀWJ and M = L⁻¹ toᵀ the covariance is Mᵀ M.
+    for row in range(6):
+        for i in range(6):
+            for k in range(i):
+                to[row, i] -= factor[i, k] * to[row, k]
+            to[row, i] /= factor[i, i]
+    covariance = np.empty((6, 6))
+    for i in range(6):
+        for j in range(i + 1):
+            covariance[i, j] = covariance[j, i] = np.sum(to[i] * to[j])
+    return covariance
+
+
+@compiled
+def rotation_of(vector: Array) -> Array:
+    """(3, 3) exp([r]) of a rotation vector (3,) (Rodrigues)."""
+    x, y, z = vector[0], vector[1], vector[2]
+    angle2 = x * x + y * y + z * z
+    angle = math.sqrt(angle2)
+    if angle < 1e-8:
+        sine, rest = 1.0, 0.5
+    else:
+        sine, rest = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle2
+    rotation = np.empty((3, 3))
+    rotation[0, 0], rotation[0, 1] = 1.0 - rest * (y * y + z * z), rest * x * y - sine * z
+    rotation[0, 2] = rest * x * z + sine * y
+    rotation[1, 0], rotation[1, 1] = rest * x * y + sine * z, 1.0 - rest * (x * x + z * z)
+    rotation[1, 2] = rest * y * z - sine * x
+    rotation[2, 0], rotation[2, 1] = rest * x * z - sine * y, rest * y * z + sine * x
+    rotation[2, 2] = 1.0 - rest * (x * x + y * y)
+    return rotation
+
+
+@compiled
+def left_jacobian(vector: Array) -> Array:
+    """(3, 3) J_l with exp([r + dr]) = exp([J_l dr]) exp([r]) to first order (Barfoot 2017, equation 7.77)."""
+    x, y, z = vector[0], vector[1], vector[2]
+    angle = math.sqrt(x * x + y * y + z * z)
+    left = np.eye(3)
+    if angle < 1e-8:
+        return left
+    sine = math.sin(angle) / angle
+    a, b, c = x / angle, y / angle, z / angle
+    k, h = 1.0 - sine, (1.0 - math.cos(angle)) / angle
+    left[0, 0], left[0, 1], left[0, 2] = sine + k * a * a, k * a * b - h * c, k * a * c + h * b
+    left[1, 0], left[1, 1], left[1, 2] = k * a * b + h * c, sine + k * b * b, k * b * c - h * a
+    left[2, 0], left[2, 1], left[2, 2] = k * a * c - h * b, k * b * c + h * a, sine + k * c * c
+    return left
+
+
+@compiled
+def attitude_weight(vector: Array, weights: Array) -> Array:
+    """(3, 3) J_lᵀ W J_l: what weights W (3, 3) of a small rotation are for the rotation vector (3,)."""
+    left = left_jacobian(vector)
+    return left.T @ weights @ left
+
+
+@compiled
+def _cholesky(matrix: Array) -> bool:
+    """Put the lower factor of a symmetric matrix into its lower triangle; False where it is not positive definite."""
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            value = matrix[i, j]
+            for k in range(j):
+                value -= matrix[i, k] * matrix[j, k]
+            if i > j:
+                matrix[i, j] = value / matrix[j, j]
+            elif value > 0.0:
+                matrix[i, i] = math.sqrt(value)
+            else:
+                return False
+    return True
+
+
+@compiled
+def _substitute(factor: Array, right: Array) -> None:
+    """Solve L Lᵀ x = b for a lower factor (n, n), in place of b (n,)."""
+    size = len(right)
+    for i in range(size):
+        for k in range(i):
+            right[i] -= factor[i, k] * right[k]
+        right[i] /= factor[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            right[i] -= factor[k, i] * right[k]
+        right[i] /= factor[i, i]
