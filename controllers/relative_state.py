@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lapack
 
 from auvdock.controllers.senses import Rows, Senses, Vector, cross, rotate, rotate_back, turn
-from auvdock.core.arrays import Array, constant
+from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
 from auvdock.core.contracts import PoseEstimate
 from auvdock.core.errors import ConfigError
 
@@ -23,8 +23,6 @@ __all__ = ["FilterCfg", "RelativeFilter", "RelativeState"]
 
 
 Quad = tuple[float, float, float, float]
-_lapack: Any = lapack  # its stub lists no routines
-_HALF = constant(0.5)
 
 
 @dataclass(frozen=True)
@@ -110,12 +108,8 @@ class RelativeFilter:
         self._lever: Vector = (float(T_body_camera[0, 3]), float(T_body_camera[1, 3]), float(T_body_camera[2, 3]))
         self._R_body_camera = np.ascontiguousarray(T_body_camera[:3, :3])
         walk, turn = cfg.position_walk_m_rs**2 * dt_s, cfg.heading_walk_rad_rs**2 * dt_s
-        self._still = np.eye(4)
         self._process = np.diag([walk, walk, walk, turn])
         self._floor = np.diag([cfg.position_floor_m**2] * 3 + [cfg.rotation_floor_rad**2] * 3)
-        self._sensitivity = np.zeros((6, 4))
-        self._sensitivity[:3, :3] = np.eye(3)
-        self._inflation = constant(cfg.inflation)
         self._max_trace = 1.0 + 2.0 * math.cos(cfg.max_rotation_mismatch_rad)
 
     def predict(self, state: RelativeState, senses: Senses) -> RelativeState:
@@ -127,13 +121,10 @@ class RelativeFilter:
         velocity = rotate(self._R_station_body(state.axis_yaw_rad, senses), body)
         x, y, z = state.camera_m
         # A turn of the axis turns the velocity the other way: ∂v/∂ψ_s = −e_z × v.
-        move = self._still.copy()
-        move[0, 3] = velocity[1] * dt_s
-        move[1, 3] = -velocity[0] * dt_s
         return RelativeState(
             (x + velocity[0] * dt_s, y + velocity[1] * dt_s, z + velocity[2] * dt_s),
             state.axis_yaw_rad,
-            move.dot(state.covariance).dot(move.T) + self._process,
+            _moved(state.covariance, velocity[1] * dt_s, -velocity[0] * dt_s, self._process),
             state.since_fix_s + dt_s,
             state.fixes,
             state.refused,
@@ -187,26 +178,15 @@ class RelativeFilter:
         px, py, pz = T[:3, 3].tolist()
         if e[0] + e[4] + e[8] > self._max_trace:
             innovation = np.array([px - x, py - y, pz - z, *sine])
-            sensitivity = self._sensitivity.copy()
-            np.negative(predicted[2], out=sensitivity[3:, 3])
-            HP = sensitivity.dot(state.covariance)
-            spread = HP.dot(sensitivity.T)
-            spread += self._inflation * cov
-            spread += self._floor
-            right = np.empty((6, 5), order="F")
-            right[:, :4] = HP
-            right[:, 4] = innovation
-            gain = _solve(spread, right)
-            if float(innovation.dot(gain[:, 4])) < cfg.gate:
-                dx, dy, dz, turn = HP.T.dot(gain[:, 4]).tolist()
-                covariance = state.covariance - HP.T.dot(gain[:, :4])
-                symmetric = covariance.T.copy()
-                symmetric += covariance
-                symmetric *= _HALF
+            distance, shift, covariance = _fused(
+                state.covariance, innovation, predicted[2], cov, cfg.inflation, self._floor
+            )
+            if distance < cfg.gate:
+                dx, dy, dz, turn = shift.tolist()
                 return RelativeState(
                     (x + dx, y + dy, z + dz),
                     math.remainder(state.axis_yaw_rad + turn, math.tau),
-                    symmetric,
+                    covariance,
                     0.0,
                     state.fixes + 1,
                     0,
@@ -279,13 +259,72 @@ class RelativeFilter:
         return turn(senses.level, senses.yaw_rad - axis_yaw_rad)
 
 
-def _solve(symmetric: Array, right: Array) -> Array:
-    """Solution of a symmetric positive definite system by Cholesky, straight from LAPACK: a third of NumPy's time.
+@compiled
+def _moved(covariance: Array, by_turn_x: float, by_turn_y: float, process: Array) -> Array:
+    """F P Fᵀ + Q (4, 4) with F = 1 but for what a turn of the axis does to x and y, F₀₃ and F₁₃."""
+    moved = covariance.copy()
+    moved[0] += by_turn_x * covariance[3]
+    moved[1] += by_turn_y * covariance[3]
+    turned = moved[:, 3].copy()
+    moved[:, 0] += by_turn_x * turned
+    moved[:, 1] += by_turn_y * turned
+    return moved + process
 
-    `right` is in Fortran's order and is overwritten.
+
+@compiled
+def _fused(
+    covariance: Array, innovation: Array, turn: Array, noise: Array, inflation: float, floor: Array
+) -> tuple[float, Array, Array]:
+    """Kalman update of a covariance P (4, 4) by a pose.
+
+    With H = [1, 0; 0, -turn] the innovation (6,) has the covariance S = H P Hᵀ + inflation × noise + floor (6, 6).
+
+    Returns:
+        Its squared Mahalanobis distance, `inf` for a singular S; the state's shift (4,); (1 - K H) P (4, 4).
     """
-    _, solution, info = _lapack.dposv(symmetric, right, overwrite_b=1)
-    return solution if info == 0 else np.zeros_like(right)
+    sensitivity = np.zeros((6, 4))
+    for i in range(3):
+        sensitivity[i, i] = 1.0
+        sensitivity[3 + i, 3] = -turn[i]
+    shared = np.zeros((6, 4))
+    for i in range(6):
+        for j in range(4):
+            for k in range(4):
+                shared[i, j] += sensitivity[i, k] * covariance[k, j]
+    # S = L Lᵀ, row by row; beside it L⁻¹ H P and L⁻¹ times the innovation.
+    lower, gain, white = np.zeros((6, 6)), shared.copy(), innovation.copy()
+    distance = 0.0
+    for i in range(6):
+        for j in range(i + 1):
+            value = inflation * noise[i, j] + floor[i, j]
+            for k in range(4):
+                value += shared[i, k] * sensitivity[j, k]
+            for k in range(j):
+                value -= lower[i, k] * lower[j, k]
+            if i > j:
+                lower[i, j] = value / lower[j, j]
+            elif value > 0.0:
+                lower[i, i] = math.sqrt(value)
+            else:
+                return np.inf, np.zeros(4), covariance
+        for k in range(i):
+            white[i] -= lower[i, k] * white[k]
+            for j in range(4):
+                gain[i, j] -= lower[i, k] * gain[k, j]
+        white[i] /= lower[i, i]
+        for j in range(4):
+            gain[i, j] /= lower[i, i]
+        distance += white[i] * white[i]
+    shift, rest = np.zeros(4), covariance.copy()
+    for i in range(4):
+        for k in range(6):
+            shift[i] += gain[k, i] * white[k]
+        for j in range(i + 1):
+            value = 0.5 * (covariance[i, j] + covariance[j, i])
+            for k in range(6):
+                value -= gain[k, i] * gain[k, j]
+            rest[i, j] = rest[j, i] = value
+    return distance, shift, rest
 
 
 def _dot(a: Quad, b: Quad) -> float:

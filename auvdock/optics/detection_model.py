@@ -30,7 +30,6 @@ __all__ = [
     "veiled_share",
 ]
 
-_ONES = np.ones(2)
 _VEILED_DN, _LEAST_DN = 50.0, 1e-3
 _HAZE_PX = 20.0
 _GHOST_FLUX = 0.3
@@ -303,17 +302,43 @@ def _measured(
     return centre, half, score, class_id
 
 
+@compiled
 def squared_distances(pixels: Array) -> Array:
     """(m, m) squared distances between points (m, 2)."""
-    offset = pixels[:, None, :] - pixels
-    offset *= offset
-    return offset.dot(_ONES)
+    distance2 = np.empty((len(pixels), len(pixels)))
+    for i in range(len(pixels)):
+        for j in range(len(pixels)):
+            x, y = pixels[i, 0] - pixels[j, 0], pixels[i, 1] - pixels[j, 1]
+            distance2[i, j] = x * x + y * y
+    return distance2
 
 
 def veiled_share(seen: Candidates) -> float:
     """Share of lights whose surroundings outshine their contrast by 50 codes or more."""
-    m = len(seen.flux)
-    return np.count_nonzero(seen.surround_dn > seen.contrast_dn + _VEILED_DN) / m if m else 0.0
+    return _veiled(seen.surround_dn, seen.contrast_dn) / max(len(seen.flux), 1)
+
+
+@compiled
+def _veiled(surround: Array, contrast: Array) -> int:
+    """How many of the lights (m,) are."""
+    count = 0
+    for i in range(len(contrast)):
+        if surround[i] > contrast[i] + _VEILED_DN:
+            count += 1
+    return count
+
+
+@compiled
+def _close(distance2: Array, radius: Array, merge_px: float, merge_radii: float) -> tuple[bool, BoolArray]:
+    """Whether any two lights are, and which (m, m) are, too close to be told apart."""
+    close = np.empty(distance2.shape, dtype=np.bool_)
+    found = False
+    for i in range(len(radius)):
+        for j in range(len(radius)):
+            limit = merge_px + merge_radii * (radius[i] + radius[j])
+            close[i, j] = distance2[i, j] < limit * limit
+            found = found or (close[i, j] and i != j)
+    return found, close
 
 
 def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
@@ -324,11 +349,8 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
     m = len(seen.flux)
     if m < 2:
         return seen
-    reach = model.merge_radii * seen.radius_px
-    limit = reach[:, None] + (reach + model.merge_px)
-    limit *= limit
-    close = seen.distance2_px2 < limit
-    if np.count_nonzero(close) == m:
+    found, close = _close(seen.distance2_px2, seen.radius_px, model.merge_px, model.merge_radii)
+    if not found:
         return seen
     pixels, contrast, flux = seen.pixels.copy(), seen.contrast_dn.copy(), seen.flux.copy()
     radius = seen.radius_px.copy()

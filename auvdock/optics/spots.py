@@ -160,10 +160,10 @@ def _areas(profile: Array, channel: Array, scale: float, ring_px2: Array) -> Arr
 @compiled
 def _at_distance(profile: Array, distance2_px2: Array, first2: float, per_log2: float) -> Array:
     """`SpotModel.at_distance`."""
-    value = np.empty(distance2_px2.shape)
+    value = np.empty((len(distance2_px2), len(profile)))
     last = profile.shape[1] - 1
-    for i in range(value.shape[0]):
-        for j in range(value.shape[1]):
+    for i in range(len(distance2_px2)):
+        for j in range(len(profile)):
             place = math.log(max(distance2_px2[i, j], first2) / first2) * per_log2
             value[i, j] = profile[j, min(int(place + 0.5), last)]
     return value

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.errors import ConfigError
-from auvdock.perception.pnp_refine import attitude_weight, pose_covariance, refine, rotation_of
+from auvdock.perception.pnp_refine import attitude_weight, pose_covariance, refine, rotation_of, vector_of
 
 __all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "translation_from_rotation"]
 
@@ -182,7 +182,7 @@ class PnpSolver:
         translation = translation_from_rotation(prior, points, self._camera.normalise(pixels))
         if translation is None:
             return None
-        return self._refine((_rodrigues(prior).ravel(), translation), points, pixels, sigma, prior, "iterative")
+        return self._refine((_rodrigues(prior), translation), points, pixels, sigma, prior, "iterative")
 
     def _refine(
         self,
@@ -221,7 +221,7 @@ class PnpSolver:
         """The prior's rotation vector (3,) and its weight J_lᵀ W J_l (3, 3), W that of a small rotation; or zeros."""
         if not self._prior_weight:
             return _NO_VECTOR, _NO_WEIGHT
-        vector = _rodrigues(prior).ravel()
+        vector = _rodrigues(prior)
         weights = self._prior_weight * _EYE_3
         if self.heading_sigma_rad is not None:
             up = prior[:, 2]
@@ -250,7 +250,8 @@ def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Ar
 
 
 def _rodrigues(rotation: Array) -> Array:
-    return np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64)
+    vector = vector_of(rotation)
+    return vector if math.isfinite(vector[0]) else np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64).ravel()
 
 
 def _vector(column: NDArray[Any]) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.compiled import compiled
 
-__all__ = ["attitude_weight", "left_jacobian", "pose_covariance", "refine", "rotation_of"]
+__all__ = ["attitude_weight", "left_jacobian", "pose_covariance", "refine", "rotation_of", "vector_of"]
 
 _MAX_ITERATIONS = 20
 
@@ -210,6 +210,22 @@ def rotation_of(vector: Array) -> Array:
     rotation[2, 0], rotation[2, 1] = rest * x * z - sine * y, rest * y * z + sine * x
     rotation[2, 2] = 1.0 - rest * (x * x + y * y)
     return rotation
+
+
+@compiled
+def vector_of(rotation: Array) -> Array:
+    """(3,) rotation vector of a rotation matrix; nan at half a turn, where the axis has two signs."""
+    vector = np.empty(3)
+    vector[0] = 0.5 * (rotation[2, 1] - rotation[1, 2])
+    vector[1] = 0.5 * (rotation[0, 2] - rotation[2, 0])
+    vector[2] = 0.5 * (rotation[1, 0] - rotation[0, 1])
+    sine = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    cosine = 0.5 * (rotation[0, 0] + rotation[1, 1] + rotation[2, 2] - 1.0)
+    if sine > 1e-6:
+        vector *= math.atan2(sine, cosine) / sine
+    elif cosine < 0.0:
+        vector[:] = np.nan
+    return vector
 
 
 @compiled

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from auvdock.perception.pnp_refine import _cholesky, _project, _substitute, left_jacobian, rotation_of
+from auvdock.perception.pnp_refine import _cholesky, _project, _substitute, left_jacobian, rotation_of, vector_of
 
 MATRIX = np.array([[350.0, 0.0, 321.0], [0.0, 347.0, 177.5], [0.0, 0.0, 1.0]])
 
@@ -29,6 +29,7 @@ def test_rotation_is_opencvs_and_its_jacobian_the_difference(size):
     vector = rng.normal(size=3)
     vector *= size / np.linalg.norm(vector)
     assert rotation_of(vector) == pytest.approx(cv2.Rodrigues(vector)[0], abs=1e-12)
+    assert vector_of(rotation_of(vector)) == pytest.approx(vector, abs=1e-11)
     step = 1e-6 * rng.normal(size=3)
     turn = rotation_of(vector + step) @ rotation_of(vector - step).T
     # Of so small a turn the logarithm is the antisymmetric part.
