@@ -16,11 +16,13 @@ from rich.console import Console
 from rich.table import Table
 
 from auvdock.cli.parsing import parse
+from auvdock.core.compiled import cache_folder
 from auvdock.core.errors import AuvdockError
+from auvdock.perception.components import components
 
 __all__ = ["Check", "Doctor", "examine", "run"]
 
-PACKAGES = ("mujoco", "gymnasium", "numpy", "scipy", "opencv-python-headless", "onnxruntime", "control")
+PACKAGES = ("mujoco", "gymnasium", "numpy", "scipy", "opencv-python-headless", "onnxruntime", "control", "numba")
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ def examine() -> list[Check]:
     checks += [_package(name) for name in PACKAGES]
     checks.append(_try("OpenGL (fidelity pixels)", False, _open_gl))
     checks.append(_try("ONNX Runtime", True, _onnx))
+    checks.append(_compiled_loops())
     checks.append(_viewer())
     ray = importlib.util.find_spec("ray") is not None
     checks.append(Check("Ray (many machines)", ray, False, "importable" if ray else "not installed"))
@@ -99,6 +102,12 @@ def _onnx() -> str:
     import onnxruntime
 
     return ", ".join(onnxruntime.get_available_providers())
+
+
+def _compiled_loops() -> Check:
+    folder = cache_folder(components)
+    remedy = "" if folder else "they are compiled anew in every process, some 20 s: set NUMBA_CACHE_DIR"
+    return Check("compiled loops", folder is not None, False, f"kept in {folder}" if folder else "not kept", remedy)
 
 
 def _viewer() -> Check:

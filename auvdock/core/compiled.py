@@ -15,7 +15,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["compiled"]
+__all__ = ["cache_folder", "compiled"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -28,3 +28,8 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
         return _numba.njit(cache=True, error_model="numpy")(function)
     except RuntimeError:  # no folder for the cache can be written
         return _numba.njit(error_model="numpy")(function)
+
+
+def cache_folder(function: Callable[..., object]) -> str | None:
+    """Where a compiled function is kept on disk; None where no folder could be written."""
+    return getattr(getattr(function, "stats", None), "cache_path", None)

@@ -27,6 +27,7 @@ def software_versions() -> dict[str, str]:
     return {
         "auvdock": version("auvdock"),
         "mujoco": mujoco.__version__,
+        "numba": version("numba"),
         "numpy": np.__version__,
         "opencv": cv2.__version__,
         "python": platform.python_version(),

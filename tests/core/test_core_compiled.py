@@ -1,6 +1,6 @@
 import numpy as np
 
-from auvdock.core.compiled import compiled
+from auvdock.core.compiled import cache_folder, compiled
 
 
 def count_above(values, level):
@@ -28,4 +28,6 @@ def test_compiles_where_no_cache_can_be_kept():
     # Code without a file has no place for one, like a package in a read-only folder of a user without a home.
     space = {}
     exec("def twice(x):\n    return 2 * x", space)
-    assert compiled(space["twice"])(21) == 42
+    twice = compiled(space["twice"])
+    assert twice(21) == 42
+    assert cache_folder(twice) is None
