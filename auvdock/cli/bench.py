@@ -109,6 +109,7 @@ def _state_env() -> dict[str, Any]:
 
 def _episodes(fidelity: str, count: int, station: str = "conical") -> dict[str, Any]:
     runner = EpisodeRunner(_cfg(fidelity, station))
+    runner.run(0)  # not timed: on a new machine it compiles the inner loops, which is done once
     clock = _StageClock()
     clock.attach(runner)
     factors: list[float] = []
