@@ -1,9 +1,8 @@
-"""Loops over pixels, compiled by Numba where NumPy would take a dozen passes over the memory.
+"""Loops over pixels, lights and small matrices, compiled by Numba where NumPy would take dozens of calls.
 
-A compiled function is plain Python that also runs uncompiled (`function.py_func`), and the tests hold the two against
-each other. It is compiled once, on its first call with arguments of its types, and kept on disk beside its module, or
-in the user's cache folder, or not at all where neither can be written. Arithmetic keeps to IEEE 754, so the same
-machine gives the same bits each time.
+A compiled function is plain Python. It is compiled once, on its first call with arguments of its types, and kept on
+disk beside its module, or in the user's cache folder, or not at all where neither can be written. Arithmetic keeps to
+IEEE 754, so the same machine gives the same bits each time.
 
 Numba notices when the file of a kept function changes, but not when a function that it calls from another file does:
 hence a compiled function calls only compiled functions of its own file.

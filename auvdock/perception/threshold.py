@@ -134,12 +134,12 @@ class ThresholdDetector:
     def _components(self, contrast: Image, threshold: float) -> list[tuple[int, int, int, int, int]]:
         """(x, y, width, height, area) of the components above a threshold."""
         found = components(contrast, threshold)
-        most = contrast.size
+        too_large = contrast.size + 1
         if len(found) > 2000:
             # A threshold drowned in noise: keep the largest, the rest is no light.
             found = found[np.argsort(-found[:, 4], kind="stable")[:2000]]
-            most = contrast.size / 2
-        return [tuple(row) for row in found.tolist() if self._cfg.min_area_px <= row[4] <= most]
+            too_large = contrast.size / 2
+        return [tuple(row) for row in found.tolist() if self._cfg.min_area_px <= row[4] < too_large]
 
     def _split(
         self, patch: Image, floor: float, x: int, y: int, prominence: float, spots: list[_Spot], depth: int = 0
