@@ -6,6 +6,10 @@ the station frame, whose x is the paper's Y and whose y is the paper's X.
 
 Day is the level "mild" of the daylight nuisance: 0.3 W/m² per band below the surface, a three-hundredth of full sun.
 The pool is deep and, by its gantry, indoors; the paper gives no light level, so this one is ours.
+
+Two more things that the paper does not say decide how far the flash is seen. Its network sees all of a halo, where the
+threshold detector takes for background what is broader than its window: `network_stand_in` has a window that holds the
+halos of 50 m. And how sensitive the camera is: `MAX_GAIN`.
 """
 
 from __future__ import annotations
@@ -25,15 +29,35 @@ from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.transforms import make_transform
 from auvdock.optics.imaging import ImagingCfg, Shot, UnderwaterCamera
 from auvdock.optics.nuisance import NuisanceCfg
+from auvdock.optics.settings import ExposureCfg
 from auvdock.optics.water import WaterCfg, load_water
+from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
-__all__ = ["X_M", "Y_M", "PoolRig", "ShrunkDetector", "Visibility", "flash_visibility"]
+__all__ = [
+    "MAX_GAIN",
+    "X_M",
+    "Y_M",
+    "PoolRig",
+    "ShrunkDetector",
+    "Visibility",
+    "flash_visibility",
+    "network_stand_in",
+    "share_of_turns",
+]
 
 X_M = (4.5, 1.5, -1.5, -4.5)
 """Paper B, table 5: positions along the gantry."""
 Y_M = (20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0)
 """Paper B, table 5: distances along the pool."""
 DEPTH_M = 3.0
+MAX_GAIN = 1.64
+"""Greatest gain of the rig's camera at its longest exposure, 16 ms: calibrated on the night rows of paper B's table 5.
+
+With 1.62 to 1.68 the flash is found at Y = 50 m, X = ±1.5 m in more than half of the turns and at X = ±4.5 m in fewer:
+the four places differ by 5 % of light. A third less and it is found on no line, a third more and on all."""
+_NETWORK_PX = 640
+_HALO_PX = 120
+_LEAST_PX = 20
 _NEAR_RAD = 0.06
 
 
@@ -75,7 +99,7 @@ class PoolRig:
             NuisanceCfg(
                 parts.flicker, parts.marine_snow, parts.interfering_lights, parts.surface_reflection, daylight=level
             ),
-            ImagingCfg(surfaces=False),
+            ImagingCfg(surfaces=False, exposure=ExposureCfg(max_gain=MAX_GAIN)),
             make_transform(np.eye(3), np.array([0.0, 0.0, -DEPTH_M])),
             rotating=self.beacon,
         )
@@ -120,7 +144,7 @@ class ShrunkDetector:
     Boxes and centres come back in the pixels of the whole frame.
     """
 
-    def __init__(self, detector: Detector, camera: CameraCfg, width_px: int = 640) -> None:
+    def __init__(self, detector: Detector, camera: CameraCfg, width_px: int = _NETWORK_PX) -> None:
         """Take the detector and the size that it is to see."""
         self._detector = detector
         self._factor = camera.width_px / width_px
@@ -143,6 +167,14 @@ class ShrunkDetector:
             found.class_id,
             found.flux,
         )
+
+
+def network_stand_in(camera: CameraCfg) -> ShrunkDetector:
+    """What stands in for the paper's network here: the threshold detector on frames shrunk to 640 pixels.
+
+    What is broader than 120 of them (16°) is background; by default that is 40, less than the halo at 50 m.
+    """
+    return ShrunkDetector(ThresholdDetector(ThresholdCfg(min_area_px=_LEAST_PX, background_px=_HALO_PX, flux=True)), camera)
 
 
 @dataclass(frozen=True)
@@ -192,18 +224,42 @@ def flash_visibility(
     order = np.argsort(np.abs(offsets), kind="stable")
     facing_s, rate = rig.facing_s(x_m, y_m), rig.beacon.rate_rev_s
     times = (facing_s + float(offsets[k]) / 360.0 / rate for k in order)
-    place = rig.beacon_px(x_m, y_m)
-    near_px = _NEAR_RAD * float(rig.camera.matrix[0, 0])
     seen = np.zeros(len(offsets), dtype=np.bool_)
     for k, shot in zip(order, rig.shots(x_m, y_m, times, np.random.default_rng(seed)), strict=True):
-        found = detector.detect(shot.frame)
-        size = found.xyxy[:, 2:] - found.xyxy[:, :2]
-        close = np.linalg.norm(found.centre_px - place, axis=1) < near_px
-        seen[k] = bool(np.any(close & (size.max(axis=1, initial=0.0) < 4.0 * near_px)))
+        seen[k] = _found(rig, detector.detect(shot.frame), x_m, y_m)
     facing = np.abs(offsets) <= 3.0
     arc = float(np.count_nonzero(seen)) * step_deg
     frame_deg = 360.0 * rate / rig.camera_cfg.rate_hz
     return Visibility(x_m, y_m, day, arc, float(seen[facing].mean()), arc / frame_deg)
+
+
+def share_of_turns(rig: PoolRig, detector: Detector, x_m: float, y_m: float, turns: int = 24, seed: int = 0) -> float:
+    """Share of turns in which a detector finds the flash in at least one frame.
+
+    Frames and beam are not in step: over the turns, the beam's nearest frame falls on directions that are spread evenly
+    over the angle between two frames. The frames with the beam within one and a half such angles are looked at.
+
+    Args:
+        rig: the pool.
+        detector: finds lights.
+        x_m: along the gantry.
+        y_m: along the pool.
+        turns: so many.
+        seed: of the noise.
+    """
+    phases = (np.arange(turns) + 0.5) / turns - 0.5
+    times = rig.facing_s(x_m, y_m) + (phases[:, None] + np.array([-1.0, 0.0, 1.0])) / rig.camera_cfg.rate_hz
+    shots = rig.shots(x_m, y_m, times.ravel().tolist(), np.random.default_rng(seed))
+    seen = np.array([_found(rig, detector.detect(shot.frame), x_m, y_m) for shot in shots])
+    return float(seen.reshape(turns, -1).any(axis=1).mean())
+
+
+def _found(rig: PoolRig, found: Detections, x_m: float, y_m: float) -> bool:
+    """Whether one of the detections is the beacon: within 60 mrad of it, and no larger than a quarter of a radian."""
+    near_px = _NEAR_RAD * float(rig.camera.matrix[0, 0])
+    size = found.xyxy[:, 2:] - found.xyxy[:, :2]
+    close = np.linalg.norm(found.centre_px - rig.beacon_px(x_m, y_m), axis=1) < near_px
+    return bool(np.any(close & (size.max(axis=1, initial=0.0) < 4.0 * near_px)))
 
 
 def _no_array(lamps: tuple[BeaconCfg, ...]) -> BeaconLayout:

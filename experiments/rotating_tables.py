@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -19,10 +18,8 @@ __all__ = [
     "PAPER_DEVIATION_DEG",
     "PLACES",
     "REFERENCE",
-    "Limit",
     "Mean",
     "ScenarioRow",
-    "limits",
     "mean_error",
     "paper_mean",
     "run_videos",
@@ -76,17 +73,6 @@ class Mean:
     high: float | None
     passes: int
     videos: int
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Farthest Y at which a pass is timed in at least half of the videos, 0 for none."""
-
-    x_m: float
-    day: bool
-    paper_m: float
-    paper_method_m: float
-    ours_m: float
 
 
 @dataclass(frozen=True)
@@ -175,26 +161,6 @@ def run_videos(
     return [done[k] for k in range(len(jobs))]
 
 
-def limits(watches: Sequence[Watch]) -> list[Limit]:
-    """Detection limits by day and night along each line of the grid."""
-    rows: list[Limit] = []
-    for x_m in X_M:
-        for day in (True, False):
-            own = [w for w in watches if (w.place.x_m, w.place.day) == (x_m, day)]
-            paper = PAPER_AZIMUTH_DEG[x_m, day]
-            seen = [y for y, value in zip(Y_M, paper, strict=True) if value is not None]
-            rows.append(
-                Limit(
-                    x_m,
-                    day,
-                    max(seen),
-                    _farthest(own, lambda w: len(w.paper_deg) >= 0.5 * w.turns),
-                    _farthest(own, lambda w: len(w.ours_deg) >= 0.5 * w.passes),
-                )
-            )
-    return rows
-
-
 def scenario_rows(
     videos: int,
     turns: int,
@@ -218,12 +184,3 @@ def scenario_rows(
             )
         )
     return rows
-
-
-def _farthest(watches: Sequence[Watch], good: Callable[[Watch], bool]) -> float:
-    best = 0.0
-    for y_m in sorted({w.place.y_m for w in watches}):
-        there = [w for w in watches if w.place.y_m == y_m]
-        if sum(good(w) for w in there) >= math.ceil(0.5 * len(there)):
-            best = y_m
-    return best

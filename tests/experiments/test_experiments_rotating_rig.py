@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from auvdock.core.camera import CameraCfg
-from auvdock.experiments.rotating_rig import PoolRig, ShrunkDetector, flash_visibility
+from auvdock.experiments.rotating_rig import (
+    PoolRig,
+    ShrunkDetector,
+    flash_visibility,
+    network_stand_in,
+    share_of_turns,
+)
 from auvdock.optics.water import load_water, with_attenuation
 from auvdock.perception.threshold import ThresholdDetector
 
@@ -38,9 +44,9 @@ def test_brightest_when_the_beam_points_at_the_camera(rig):
 
 
 def test_arc_shrinks_with_range(rig):
-    detector = ShrunkDetector(ThresholdDetector(), SMALL)
+    detector = network_stand_in(SMALL)
     near, far, beyond = (
-        flash_visibility(rig, detector, 1.5, y_m, day=False, step_deg=6.0, reach_deg=42.0) for y_m in (20.0, 56.0, 85.0)
+        flash_visibility(rig, detector, 1.5, y_m, day=False, step_deg=6.0, reach_deg=42.0) for y_m in (20.0, 45.0, 60.0)
     )
     assert near.arc_deg > far.arc_deg > 0.0
     assert near.facing_share == far.facing_share == 1.0
@@ -53,3 +59,23 @@ def test_shrunk_detector_keeps_places():
     shot = next(rig.shots(-4.5, 20.0, [rig.facing_s(-4.5, 20.0)], np.random.default_rng(0)))
     found = ShrunkDetector(ThresholdDetector(), SMALL, 480).detect(shot.frame)
     assert np.linalg.norm(found.centre_px - rig.beacon_px(-4.5, 20.0), axis=1).min() < 0.7
+
+
+def test_share_of_turns_falls_from_one_to_none(rig):
+    detector = network_stand_in(SMALL)
+    shares = [share_of_turns(rig, detector, 1.5, y_m, turns=6) for y_m in (40.0, 60.0)]
+    assert shares == [1.0, 0.0]
+
+
+@pytest.mark.render
+def test_daylight_ends_what_the_night_lets_see():
+    """Paper B, section 5.2: 45 m by day as by night; at 50 m by night near the axis only, by day not at all."""
+    seen = {}
+    for day in (True, False):
+        pool = PoolRig(day)
+        detector = network_stand_in(pool.camera_cfg)
+        for x_m, y_m in ((-4.5, 45.0), (1.5, 50.0), (4.5, 50.0)):
+            seen[day, x_m, y_m] = share_of_turns(pool, detector, x_m, y_m, turns=12)
+    assert seen[True, -4.5, 45.0] == seen[False, -4.5, 45.0] == 1.0
+    assert seen[True, 1.5, 50.0] == seen[True, 4.5, 50.0] == 0.0
+    assert seen[False, 1.5, 50.0] > 0.5 > seen[False, 4.5, 50.0]

@@ -10,10 +10,8 @@ from auvdock.experiments.rotating_tables import (
     PAPER_AZIMUTH_DEG,
     PAPER_DEVIATION_DEG,
     PLACES,
-    limits,
     mean_error,
     paper_mean,
-    run_videos,
 )
 from auvdock.experiments.rotating_watch import Place, Scenario, watch
 
@@ -76,12 +74,3 @@ def test_one_place_in_pixels() -> None:
         assert abs(error) < 6.0 * frames
     assert found.bound_deg is not None
     assert 0.0 < found.bound_deg < 0.1
-
-
-def test_limits_count_videos_with_passes() -> None:
-    """A place where half of the videos time their passes counts, the paper's own limits come from its table."""
-    rows = limits(run_videos([Place(1.5, 20.0, False)], 1, 4, "beacons"))
-    near = next(row for row in rows if (row.x_m, row.day) == (1.5, False))
-    assert (near.paper_m, near.ours_m) == (50.0, 20.0)
-    far = next(row for row in rows if (row.x_m, row.day) == (4.5, True))
-    assert (far.paper_m, far.ours_m) == (45.0, 0.0)
