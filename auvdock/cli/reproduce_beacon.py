@@ -243,12 +243,12 @@ def _print(kind: _Kind, report: dict[str, Any], farthest: Sequence[Limit], scena
 
 def _print_limits(console: Console, rows: Sequence[Limit]) -> None:
     table = Table(title="farthest Y at which the beacon is seen, m", title_justify="left")
-    for name in ("X", "paper", "flash found", "of the turns", "its method here", "ours"):
+    for name in ("X", "paper", "flash found", f"turns at {Y_M[-1]:g} m", "its method here", "ours"):
         table.add_column(name, justify="left" if name == "X" else "right")
     for row in rows:
         title = f"{row.x_m:+g} m {'day' if row.day else 'night'}"
         found = "-" if row.found_m is None else f"{row.found_m:g}"
-        shares = ", ".join(f"{share:.0%} at {y_m:g}" for y_m, share in row.shares) or "-"
+        shares = f"{row.shares[0][1]:.0%}" if row.shares else "-"
         table.add_row(title, f"{row.paper_m:g}", found, shares, f"{row.paper_method_m:g}", f"{row.ours_m:g}")
     console.print(table)
     console.print(
