@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconCfg
 from auvdock.core.camera import Camera, CameraCfg
 from auvdock.core.contracts import Detections, Proprioception
