@@ -73,7 +73,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         module, function = COMMANDS[command][0].split(":")
         run: Callable[[Sequence[str], str], int] = getattr(import_module(module), function)
         relax_collector()
-        return run(words[len(command) :], "auvdock " + " ".join(command))
+        from auvdock.core.compiled import compiling  # half a second, not for a usage message
+
+        with compiling(_tell_of_compiling):
+            return run(words[len(command) :], "auvdock " + " ".join(command))
     except AuvdockError as error:
         print(f"auvdock: error: {error}", file=sys.stderr)
         return 2
@@ -83,6 +86,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 141
+
+
+def _tell_of_compiling() -> None:
+    print("auvdock: compiling inner loops, once after an installation: some 20 s", file=sys.stderr, flush=True)
 
 
 def _find(words: Sequence[str]) -> tuple[str, ...] | None:

@@ -42,7 +42,9 @@ class SweepProgress:
         if self._console.is_terminal:
             columns = (BarColumn(30), TextColumn("{task.description}"))
             self._progress = Progress(*columns, console=self._console, transient=True)
-            self._progress.add_task("starting workers", total=planned, completed=tally.episodes)
+            self._progress.add_task(
+                "starting; a new installation first compiles, some 20 s", total=planned, completed=tally.episodes
+            )
             self._progress.start()
 
     def on_row(self, row: Row, tally: Tally) -> None:

@@ -10,15 +10,17 @@ hence a compiled function calls only compiled functions of its own file.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["cache_folder", "compiled"]
+__all__ = ["cache_folder", "compiled", "compiling"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _numba: Any = import_module("numba")
+_events: Any = import_module("numba.core.event")
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -32,3 +34,27 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def cache_folder(function: Callable[..., object]) -> str | None:
     """Where a compiled function is kept on disk; None where no folder could be written."""
     return getattr(getattr(function, "stats", None), "cache_path", None)
+
+
+@contextmanager
+def compiling(tell: Callable[[], object]) -> Generator[None]:
+    """Call `tell` once within this context, when a function is about to be compiled that was not kept on disk."""
+    listener = _First(tell)
+    with _events.install_listener("numba:compile", listener):
+        yield
+
+
+class _First(_events.Listener):
+    """Passes on the first event."""
+
+    def __init__(self, tell: Callable[[], object]) -> None:
+        self._tell: Callable[[], object] | None = tell
+
+    def on_start(self, event: object) -> None:
+        """A function is about to be compiled."""
+        if self._tell is not None:
+            tell, self._tell = self._tell, None
+            tell()
+
+    def on_end(self, event: object) -> None:
+        """It is compiled."""

@@ -1,6 +1,6 @@
 import numpy as np
 
-from auvdock.core.compiled import cache_folder, compiled
+from auvdock.core.compiled import cache_folder, compiled, compiling
 
 
 def count_above(values, level):
@@ -31,3 +31,20 @@ def test_compiles_where_no_cache_can_be_kept():
     twice = compiled(space["twice"])
     assert twice(21) == 42
     assert cache_folder(twice) is None
+
+
+def test_tells_once_that_it_compiles():
+    space = {}
+    exec("def twice(x):\n    return 2 * x", space)
+    one, other = compiled(space["twice"]), compiled(space["twice"])
+    told = []
+    with compiling(lambda: told.append("now")):
+        assert told == []
+        assert (one(21), other(21)) == (42, 42)
+        assert told == ["now"]
+    third = compiled(space["twice"])
+    with compiling(lambda: told.append("again")):
+        assert one(3) == 6
+        assert told == ["now"]
+        assert third(3) == 6
+    assert told == ["now", "again"]
