@@ -63,9 +63,7 @@ class Limit:
     ours_m: float
 
 
-def flash_sights(
-    workers: int = 1, tick: Callable[[], object] = lambda: None, kept: Kept | None = None
-) -> list[Sight]:
+def flash_sights(workers: int = 1, tick: Callable[[], object] = lambda: None, kept: Kept | None = None) -> list[Sight]:
     """Both lights on every line of the grid, rendered; the order is that of `X_M`, day first.
 
     Args:

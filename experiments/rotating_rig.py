@@ -174,7 +174,9 @@ def network_stand_in(camera: CameraCfg) -> ShrunkDetector:
 
     What is broader than 120 of them (16°) is background; by default that is 40, less than the halo at 50 m.
     """
-    return ShrunkDetector(ThresholdDetector(ThresholdCfg(min_area_px=_LEAST_PX, background_px=_HALO_PX, flux=True)), camera)
+    return ShrunkDetector(
+        ThresholdDetector(ThresholdCfg(min_area_px=_LEAST_PX, background_px=_HALO_PX, flux=True)), camera
+    )
 
 
 @dataclass(frozen=True)

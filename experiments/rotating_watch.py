@@ -129,10 +129,10 @@ def watch(
 ) -> Watch:
     """Watch the beacon for some turns from a random phase, camera and beacon at rest.
 
-    Both methods get the same detections, those of `rotating_rig.network_stand_in`, and both take a pass that was seen in
-    a single frame: at the edge of sight there are no more. The clocks differ as `BeaconClockCfg` says, by 0.5 ms and
-    less. The beacons fidelity knows the camera and the detector of docking, which are more sensitive, at 640 pixels. Its
-    boxes do not follow the spot's size and form, which is what algorithm 2 goes by: it is left out there.
+    Both methods get the same detections, those of `rotating_rig.network_stand_in`, and both take a pass that was seen
+    in a single frame: at the edge of sight there are no more. The clocks differ as `BeaconClockCfg` says, by 0.5 ms and
+    less. The beacons fidelity has camera, detector and settings of docking at 640 pixels, more sensitive than the
+    rig's. Its boxes do not follow the spot's size and form, which is what algorithm 2 goes by: it is left out there.
 
     Args:
         place: of the paper's grid.
@@ -152,7 +152,8 @@ def watch(
     camera = rig.camera
     if fidelity == "beacons":
         looks, camera = _beacons(rig, place, times, scenario, streams)
-    forward = ForwardBeacon(ForwardBeaconCfg(min_frames=1), camera, rig.beacon)
+    cfg = ForwardBeaconCfg(min_frames=1) if fidelity == "pixels" else ForwardBeaconCfg()
+    forward = ForwardBeacon(cfg, camera, rig.beacon)
     weights = PaperBCfg(area_weight=AREA_WEIGHT, shape_weight=1.0 - AREA_WEIGHT)
     paper, printed = (
         PaperBForwardBeacon(replace(weights, min_detections=n), camera.rate_hz)
@@ -205,7 +206,7 @@ def watch(
 def _times(
     rig: PoolRig, place: Place, turns: int, phase: float, scenario: Scenario, rng: np.random.Generator
 ) -> list[float]:
-    """Vehicle times of the frames that arrive: whole turns from a dark moment on, at a phase of 0 to 1 of the frames."""
+    """Vehicle times of the frames that arrive: whole turns from a dark moment on, the frames at a phase of 0 to 1."""
     rate = rig.camera_cfg.rate_hz
     count = round(turns * rate / rig.beacon.rate_rev_s)
     start = rig.facing_s(place.x_m, place.y_m) + 0.5 / rig.beacon.rate_rev_s + phase / rate

@@ -222,9 +222,8 @@ def _print(kind: _Kind, report: dict[str, Any], farthest: Sequence[Limit], scena
     console.print(table)
     for title, mean in (("ours", report["ours"]), ("paper's method here", report["paper_method"])):
         console.print(f"{title}: {_mean_text(Mean(**mean))}, over the places where the paper has a figure")
-    console.print(
-        "its weight of the area is calibrated on table 5's mean, the camera's gain on the night's limits of sight"
-    )
+    if report["fidelity"] == "pixels":
+        console.print("calibrated: its weight of the area on table 5's mean, the camera's gain on the limits by night")
     console.print(f"paper: {report['paper_mean_deg']:.2f}° (mean over 20 to 45 m); target {kind.target_deg:g}°")
     if report["places_without_ours"]:
         console.print(f"places where the paper has a figure and ours none: {report['places_without_ours']}")
@@ -247,9 +246,9 @@ def _print_limits(console: Console, rows: Sequence[Limit]) -> None:
         table.add_column(name, justify="left" if name == "X" else "right")
     for row in rows:
         title = f"{row.x_m:+g} m {'day' if row.day else 'night'}"
-        found = "-" if row.found_m is None else f"{row.found_m:g}"
         shares = f"{row.shares[0][1]:.0%}" if row.shares else "-"
-        table.add_row(title, f"{row.paper_m:g}", found, shares, f"{row.paper_method_m:g}", f"{row.ours_m:g}")
+        found, by_paper, ours = (f"{y_m:g}" if y_m else "-" for y_m in (row.found_m, row.paper_method_m, row.ours_m))
+        table.add_row(title, f"{row.paper_m:g}", found, shares, by_paper, ours)
     console.print(table)
     console.print(
         f"flash found in half of {SHARE_TURNS} turns; a method: half of the passes timed, in half of the videos"
