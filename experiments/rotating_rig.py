@@ -53,8 +53,8 @@ DEPTH_M = 3.0
 MAX_GAIN = 1.64
 """Greatest gain of the rig's camera at its longest exposure, 16 ms: calibrated on the night rows of paper B's table 5.
 
-With 1.62 to 1.68 the flash is found at Y = 50 m, X = ±1.5 m in more than half of the turns and at X = ±4.5 m in fewer:
-the four places differ by 5 % of light. A third less and it is found on no line, a third more and on all."""
+With 1.60 to 1.67 the flash is found at Y = 50 m, X = ±1.5 m in more than half of the turns and at X = ±4.5 m in fewer:
+the four places differ by 5 % of light. A fifth less and it is found on no line, a fifth more and on all."""
 _NETWORK_PX = 640
 _HALO_PX = 120
 _LEAST_PX = 20
