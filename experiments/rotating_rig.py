@@ -34,6 +34,7 @@ from auvdock.optics.water import WaterCfg, load_water
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
 __all__ = [
+    "FLUX_DISC_RAD",
     "MAX_GAIN",
     "X_M",
     "Y_M",
@@ -56,6 +57,8 @@ MAX_GAIN = 1.64
 With 1.60 to 1.67 the flash is found at Y = 50 m, X = ±1.5 m in more than half of the turns and at X = ±4.5 m in fewer:
 the four places differ by 5 % of light. A fifth less and it is found on no line, a fifth more and on all."""
 _NETWORK_PX = 640
+FLUX_DISC_RAD = 0.025
+"""Radius of the disc in which the stand-in measures flux: no other lamp is near, and halos are broad."""
 _HALO_PX = 120
 _LEAST_PX = 20
 _NEAR_RAD = 0.06
@@ -174,9 +177,8 @@ def network_stand_in(camera: CameraCfg) -> ShrunkDetector:
 
     What is broader than 120 of them (16°) is background; by default that is 40, less than the halo at 50 m.
     """
-    return ShrunkDetector(
-        ThresholdDetector(ThresholdCfg(min_area_px=_LEAST_PX, background_px=_HALO_PX, flux=True)), camera
-    )
+    cfg = ThresholdCfg(min_area_px=_LEAST_PX, background_px=_HALO_PX, flux=True, flux_disc_rad=FLUX_DISC_RAD)
+    return ShrunkDetector(ThresholdDetector(cfg), camera)
 
 
 @dataclass(frozen=True)

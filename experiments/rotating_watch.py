@@ -13,7 +13,7 @@ from auvdock.core.camera import Camera, CameraCfg
 from auvdock.core.contracts import Detections, Proprioception
 from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.transforms import make_transform
-from auvdock.experiments.rotating_rig import DEPTH_M, PoolRig, network_stand_in
+from auvdock.experiments.rotating_rig import DEPTH_M, FLUX_DISC_RAD, PoolRig, network_stand_in
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.sensing import BeaconSensor
@@ -294,7 +294,7 @@ def _bound_deg(rig: PoolRig, forward: ForwardBeacon, look: _Look) -> float:
     last, exposure_s = forward.passes[-1], look.exposure_s or 0.0
     focal_px = float(rig.camera.matrix[0, 0])
     shrink = rig.camera_cfg.width_px / _NETWORK_PX
-    disc_px = math.pi * (0.012 * focal_px) ** 2
+    disc_px = math.pi * (FLUX_DISC_RAD * focal_px) ** 2
     read_e = ImagingCfg().read_noise_e
     signal = PassSignal(
         peak_e=last.amplitude * exposure_s * shrink**2,

@@ -11,9 +11,9 @@ from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Frame
 from auvdock.core.response import SATURATED_CODE
 
-__all__ = ["spot_flux"]
+__all__ = ["DISC_RAD", "spot_flux"]
 
-_RADIUS_RAD = 0.012
+DISC_RAD = 0.012
 """Radius of the measured disc (ours): the peak of the halo and what noise needs, but not the neighbours."""
 _MIN_RADIUS_PX = 4.0
 _EDGES = np.array([0.0, 0.12, 0.2, 0.3, 0.42, 0.56, 0.76, 1.0, 1.4, 2.0, 2.8, 4.0])
@@ -23,10 +23,10 @@ _AROUND = 8
 _FIT_RINGS = 3
 
 
-def spot_flux(frame: Frame, centre_px: Array) -> Array:
+def spot_flux(frame: Frame, centre_px: Array, disc_rad: float = DISC_RAD) -> Array:
     """Light (n,) of the spots at `centre_px` (n, 2) in photo-electrons per second of the brightest channel.
 
-    Flux = Σ over rings of area × (mean - mean of the surroundings) / exposure time, over a disc of 12 mrad radius, with
+    Flux = Σ over rings of area × (mean - mean of the surroundings) / exposure time, over a disc of 12 mrad radius by default, with
     the ring from 1.4 to 2 radii as surroundings. A saturated core does not count as light: where rings hold saturated
     pixels their mean above the image's background (its median) is extrapolated inwards from the next three rings as an
     exponential of the radius. That meets Wells' halos at b r from 5 to 16 within a third, as long as the disc's rim is
@@ -38,7 +38,7 @@ def spot_flux(frame: Frame, centre_px: Array) -> Array:
     if n == 0:
         return flux
     focal_px = float(frame.camera.matrix[0, 0])
-    radius = max(_RADIUS_RAD * focal_px, _MIN_RADIUS_PX)
+    radius = max(disc_rad * focal_px, _MIN_RADIUS_PX)
     table = frame.response.electrons(frame.gain)
     for k, (u, v) in enumerate(centre_px.tolist()):
         flux[k] = _above(frame, u, v, radius, table, False) / frame.exposure_s

@@ -18,7 +18,7 @@ from auvdock.core.arrays import Image
 from auvdock.core.contracts import Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
 from auvdock.perception.components import components
-from auvdock.perception.flux import spot_flux
+from auvdock.perception.flux import DISC_RAD, spot_flux
 from auvdock.perception.spots import background, brightest_channel, crop_of, inside, light_class, noise_sigma
 
 __all__ = ["ThresholdCfg", "ThresholdDetector"]
@@ -48,10 +48,12 @@ class ThresholdCfg:
     """Only the components of greatest contrast are kept."""
     flux: bool = False
     """Measure each light's flux as well."""
+    flux_disc_rad: float = DISC_RAD
+    """Radius of the disc in which it is measured: a lone, blurred light asks for more, close neighbours for less."""
 
     def __post_init__(self) -> None:
         """Refuse thresholds without meaning."""
-        for name in ("noise_factor", "min_contrast"):
+        for name in ("noise_factor", "min_contrast", "flux_disc_rad"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"detector.{name}", getattr(self, name), "a value above 0")
         for name in ("min_area_px", "background_px", "max_lights"):
@@ -86,7 +88,7 @@ class ThresholdDetector:
         found = self._find(frame, regions)
         if not self._cfg.flux:
             return found
-        return dataclasses.replace(found, flux=spot_flux(frame, found.centre_px))
+        return dataclasses.replace(found, flux=spot_flux(frame, found.centre_px, self._cfg.flux_disc_rad))
 
     def _find(self, frame: Frame, regions: Sequence[RegionOfInterest]) -> Detections:
         if not regions:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -118,6 +119,15 @@ class Candidate:
             del self.times_s[:cut], self.flux[:cut], self.seen[:cut], self.rays[:cut], self.scores[:cut]
 
 
+class _Before(NamedTuple):
+    """The frame before: the camera, its spots with their compass rays, and which of them are lamps'."""
+
+    place: CameraPlace
+    spots: list[Spot]
+    rays: list[Array]
+    of_lamps: set[int]
+
+
 def merge_spots(detections: Detections, camera: Camera, cfg: ForwardBeaconCfg) -> list[Spot]:
     """Lights of a frame, brightest first.
 
@@ -164,12 +174,14 @@ class Candidates:
         self._cfg, self._camera, self._turn_s = cfg, camera, turn_s
         self._gate_cosine = math.cos(math.radians(cfg.gate_deg))
         self._flash_cosine = math.cos(math.radians(cfg.flash_deg))
+        self._wander_cosine = math.cos(math.radians(2.0 * cfg.flash_deg))
         self._merge_cosine = math.cos(math.radians(cfg.merge_deg))
-        self.all: list[Candidate] = []
+        self.reset()
 
     def reset(self) -> None:
         """Forget all."""
-        self.all = []
+        self.all: list[Candidate] = []
+        self._before: _Before | None = None
 
     def update(
         self, spots: list[Spot], place: CameraPlace, kept: Candidate | None, lit: bool
@@ -221,10 +233,23 @@ class Candidates:
             if index in owner or index in parts or len(self.all) - len(owner) > 2 * cfg.max_candidates:
                 continue
             candidate = Candidate(rays[index], place.time_s)
+            self._look_back(candidate, keep_s)
             candidate.add(place.time_s, spot, rays[index], keep_s)
             self.all.append(candidate)
             owner[index] = candidate
+        self._before = _Before(place, spots, rays, of_lamps)
         return owner, parts
+
+    def _look_back(self, candidate: Candidate, keep_s: float) -> None:
+        """What the frame before shows of a new candidate: mostly that it was dark, which brackets its pass."""
+        before = self._before
+        if before is None or not self._camera.in_view((candidate.ray_compass @ before.place.R_compass_camera)[None])[0]:
+            return
+        index = self._shared(candidate, before.rays, before.of_lamps)
+        if index is None:
+            candidate.share(before.place.time_s, None, None, keep_s)
+        else:
+            candidate.share(before.place.time_s, before.spots[index], before.rays[index], keep_s)
 
     def _assign(self, rays: list[Array], time_s: float, beacon: Candidate | None, own: int) -> dict[int, Candidate]:
         """The lit beacon's spot `own` to it, then nearest pairs first, each candidate and each spot once."""
@@ -260,8 +285,14 @@ class Candidates:
         spot near it that is no lamp's: a faint one's halo has its centre now here, now there, and falls apart.
         """
         if not candidate.lamp:
-            near = (k for k, ray in enumerate(rays) if float(ray @ candidate.ray_compass) >= self._flash_cosine)
-            return next((k for k in near if k not in of_lamps), self._nearest(candidate, rays))
+            # Its centre wanders along the beam: it is looked for where it was in the frame before.
+            last = candidate.rays[-1] if candidate.rays else None
+            centre = last if last is not None else candidate.ray_compass
+            for index, ray in enumerate(rays):
+                wandered = float(ray @ candidate.ray_compass) < self._wander_cosine
+                if index not in of_lamps and not wandered and float(ray @ centre) >= self._flash_cosine:
+                    return index
+            return self._nearest(candidate, rays)
         return self._nearest(candidate, rays)
 
     def _nearest(self, candidate: Candidate, rays: list[Array]) -> int | None:

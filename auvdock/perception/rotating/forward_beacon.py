@@ -22,6 +22,8 @@ __all__ = ["ForwardBeacon"]
 
 _LIT_BEAMS = 4.5
 """The beacon counts as lit while its beam is within so many fitted widths of the vehicle (ours)."""
+_DIMMING_M = 1.5
+"""Way on which water may take 1 - 1/e of the beacon's light: turbid water's (ours)."""
 _STRANGE = 3
 """So many passes in a row that contradict the fused estimate end it."""
 
@@ -133,10 +135,21 @@ class ForwardBeacon:
                 if self._strange >= _STRANGE:
                     self._own, self._estimate, self._sweeps = None, None, []
                 return None
+            if self._too_dim(candidate, new, self._estimate):
+                return None
         self._strange = 0
         candidate.chain = [*candidate.chain, new][-8:]
         self._sweeps = [*self._sweeps, sweep][-self._cfg.fusion_turns :]
         return self._fix(candidate, new)
+
+    def _too_dim(self, candidate: Candidate, new: Pass, estimate: BeaconEstimate) -> bool:
+        """Whether the beacon was much brighter from farther away: then this is something else that it lights."""
+        if not candidate.chain:
+            return False
+        last = candidate.chain[-1]
+        before, now = (float(np.hypot(*(estimate.beacon_m - entry.place_m))) for entry in (last, new))
+        allowed = self._cfg.amplitude_ratio * math.exp(max(now - before, 0.0) / _DIMMING_M)
+        return new.amplitude * allowed < last.amplitude
 
     def _fix(self, candidate: Candidate, new: Pass) -> AzimuthFix:
         self._estimate = estimate = fuse(self._sweeps, self._cfg)

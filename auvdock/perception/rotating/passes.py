@@ -20,6 +20,8 @@ _COVERED = 0.5
 _LEAST_STEADY = 5
 _FAINT = 0.25
 _CHAIN = 8
+_FLANK = 0.8
+"""A pass is dimmer than this share of its brightest frame on both sides (ours)."""
 _SHARPEST = math.log(0.02)
 
 
@@ -100,6 +102,14 @@ class PassFinder:
         scatter = max(scatter, 0.5 * (float(flux.max()) - steady))
         return steady, scatter, len(flux) >= _COVERED * self._frames
 
+    def _gap_rad(self, times: Array, peak_s: float) -> float:
+        """Beam angle beside the brightest frame of which no frame tells, up to the window's edge; 0 without a gap."""
+        before, after = times[times < peak_s], times[times > peak_s]
+        left = peak_s - float(before[-1]) if len(before) else self._window_s
+        right = float(after[0]) - peak_s if len(after) else self._window_s
+        gap = self._omega * max(left, right) - self._frame_rad
+        return gap if gap > 0.5 * self._frame_rad else 0.0
+
     def _fitted(
         self,
         candidate: Candidate,
@@ -115,15 +125,18 @@ class PassFinder:
         cfg = self._cfg
         near = np.abs(times - times[peak]) <= self._window_s
         lost = ~seen & ~_outside(seen)
-        beside = bool(lost[max(peak - 1, 0) : peak + 2].any())
         near &= ~lost & ((excess > 0.0) | ~seen)
         rows = np.flatnonzero(near)
+        gap_rad = self._gap_rad(times[rows], float(times[peak]))
         excess, seen = excess[rows], seen[rows]
         if int(seen.sum()) < cfg.min_frames:
             return None
         height = float(excess.max())
         least = float(excess[seen].min())
         data = np.where(seen, excess, least)
+        dimmer = np.flatnonzero(~seen | (excess < _FLANK * height))
+        if len(dimmer) == 0 or not dimmer[0] < int(excess.argmax()) < dimmer[-1]:
+            return None  # it may have been brighter before or after
         sigma = np.sqrt((cfg.flux_share * data) ** 2 + (cfg.flux_floor * height) ** 2 + scatter**2)
         prior = (math.log(0.25), 1.0)
         if candidate.chain:
@@ -133,9 +146,8 @@ class PassFinder:
         angle = self._omega * (times[rows] - origin)
         fit = fit_pass(angle, data, sigma, seen, self._beam_sigma_rad, prior)
         sigma_rad = fit.sigma_rad
-        if beside:
-            # The frame that glare took may have been the brightest: anywhere within a frame.
-            sigma_rad = math.hypot(sigma_rad, self._frame_rad / math.sqrt(12.0))
+        # A frame that glare took, that was dropped or in which the light was out of view may have been the brightest.
+        sigma_rad = math.hypot(sigma_rad, gap_rad / math.sqrt(12.0))
         if sigma_rad > math.radians(cfg.max_sigma_deg):
             return None
         if fit.widening > cfg.max_widening or abs(fit.offset_rad) > math.radians(cfg.settle_deg):
