@@ -26,8 +26,8 @@ _FIT_RINGS = 3
 def spot_flux(frame: Frame, centre_px: Array, disc_rad: float = DISC_RAD) -> Array:
     """Light (n,) of the spots at `centre_px` (n, 2) in photo-electrons per second of the brightest channel.
 
-    Flux = Σ over rings of area × (mean - mean of the surroundings) / exposure time, over a disc of 12 mrad radius by default, with
-    the ring from 1.4 to 2 radii as surroundings. A saturated core does not count as light: where rings hold saturated
+    Flux = Σ over rings of area × (mean - mean of the surroundings) / exposure time, over a disc of `disc_rad`, with the
+    ring from 1.4 to 2 radii as surroundings. A saturated core does not count as light: where rings hold saturated
     pixels their mean above the image's background (its median) is extrapolated inwards from the next three rings as an
     exponential of the radius. That meets Wells' halos at b r from 5 to 16 within a third, as long as the disc's rim is
     unsaturated (ours). So the flux of one light keeps its scale while its core goes in and out of saturation; a light

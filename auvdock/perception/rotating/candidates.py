@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -119,15 +118,6 @@ class Candidate:
             del self.times_s[:cut], self.flux[:cut], self.seen[:cut], self.rays[:cut], self.scores[:cut]
 
 
-class _Before(NamedTuple):
-    """The frame before: the camera, its spots with their compass rays, and which of them are lamps'."""
-
-    place: CameraPlace
-    spots: list[Spot]
-    rays: list[Array]
-    of_lamps: set[int]
-
-
 def merge_spots(detections: Detections, camera: Camera, cfg: ForwardBeaconCfg) -> list[Spot]:
     """Lights of a frame, brightest first.
 
@@ -181,7 +171,8 @@ class Candidates:
     def reset(self) -> None:
         """Forget all."""
         self.all: list[Candidate] = []
-        self._before: _Before | None = None
+        self._before: tuple[CameraPlace, list[Array], set[int]] | None = None
+        """The frame before: the camera, its spots' compass rays, and which of them are lamps'."""
 
     def update(
         self, spots: list[Spot], place: CameraPlace, kept: Candidate | None, lit: bool
@@ -237,19 +228,17 @@ class Candidates:
             candidate.add(place.time_s, spot, rays[index], keep_s)
             self.all.append(candidate)
             owner[index] = candidate
-        self._before = _Before(place, spots, rays, of_lamps)
+        self._before = place, rays, of_lamps
         return owner, parts
 
     def _look_back(self, candidate: Candidate, keep_s: float) -> None:
-        """What the frame before shows of a new candidate: mostly that it was dark, which brackets its pass."""
-        before = self._before
-        if before is None or not self._camera.in_view((candidate.ray_compass @ before.place.R_compass_camera)[None])[0]:
+        """Note that a new candidate was dark in the frame before, if it was in view: that brackets its pass."""
+        if self._before is None:
             return
-        index = self._shared(candidate, before.rays, before.of_lamps)
-        if index is None:
-            candidate.share(before.place.time_s, None, None, keep_s)
-        else:
-            candidate.share(before.place.time_s, before.spots[index], before.rays[index], keep_s)
+        place, rays, of_lamps = self._before
+        in_view = self._camera.in_view((candidate.ray_compass @ place.R_compass_camera)[None])[0]
+        if in_view and self._shared(candidate, rays, of_lamps) is None:
+            candidate.share(place.time_s, None, None, keep_s)
 
     def _assign(self, rays: list[Array], time_s: float, beacon: Candidate | None, own: int) -> dict[int, Candidate]:
         """The lit beacon's spot `own` to it, then nearest pairs first, each candidate and each spot once."""

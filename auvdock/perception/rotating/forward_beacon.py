@@ -51,6 +51,7 @@ class ForwardBeacon:
         self._candidates.reset()
         self._own: Candidate | None = None
         self._sweeps: list[Sweep] = []
+        self._last: Pass | None = None
         self._strange = 0
         self._widening = 1.25
         self._estimate: BeaconEstimate | None = None
@@ -129,29 +130,29 @@ class ForwardBeacon:
             gap = abs(wrap_angle(sweep.azimuth_rad - expected))
             since = (new.time_s - self._sweeps[-1].time_s) * self._beacon.rate_rev_s
             limit = 1.5 * math.radians(self._cfg.coherence_deg) * max(1.0, math.sqrt(since))
-            if gap > limit + 4.0 * math.hypot(sweep.sigma_rad, self._estimate.sigma_azimuth_rad):
+            strange = gap > limit + 4.0 * math.hypot(sweep.sigma_rad, self._estimate.sigma_azimuth_rad)
+            if strange or self._too_dim(new, self._estimate):
                 self._strange += 1
                 candidate.chain = chained(candidate.chain, new, self._beacon.rate_rev_s, self._cfg)
                 if self._strange >= _STRANGE:
-                    self._own, self._estimate, self._sweeps = None, None, []
-                return None
-            if self._too_dim(candidate, new, self._estimate):
+                    self._own, self._estimate, self._sweeps, self._last = None, None, [], None
                 return None
         self._strange = 0
         candidate.chain = [*candidate.chain, new][-8:]
         self._sweeps = [*self._sweeps, sweep][-self._cfg.fusion_turns :]
         return self._fix(candidate, new)
 
-    def _too_dim(self, candidate: Candidate, new: Pass, estimate: BeaconEstimate) -> bool:
-        """Whether the beacon was much brighter from farther away: then this is something else that it lights."""
-        if not candidate.chain:
+    def _too_dim(self, new: Pass, estimate: BeaconEstimate) -> bool:
+        """Whether the beacon was much brighter from as far or farther away: then this is another light, or a part."""
+        last = self._last
+        if last is None:
             return False
-        last = candidate.chain[-1]
         before, now = (float(np.hypot(*(estimate.beacon_m - entry.place_m))) for entry in (last, new))
         allowed = self._cfg.amplitude_ratio * math.exp(max(now - before, 0.0) / _DIMMING_M)
         return new.amplitude * allowed < last.amplitude
 
     def _fix(self, candidate: Candidate, new: Pass) -> AzimuthFix:
+        self._last = new
         self._estimate = estimate = fuse(self._sweeps, self._cfg)
         self._widening = float(np.median([entry.widening for entry in candidate.chain]))
         sweep = self._sweeps[-1]
