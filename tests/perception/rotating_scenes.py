@@ -45,6 +45,9 @@ class Scene:
     centre_sigma_px: float = 0.3
     clock_offset_s: float = 0.0
     drop_every: int = 0
+    wander: float = 0.0
+    """Shift of the spot along the beam over the beam's angle off the line of sight."""
+    beacon_until_s: float = math.inf
     beacon: RotatingBeaconCfg = BEACON
     others: dict[tuple[float, float, float], Light] = field(default_factory=dict[tuple[float, float, float], Light])
 
@@ -82,6 +85,7 @@ class Scene:
             total = (unit @ unit.T > math.cos(0.012)).astype(np.float64) @ np.array(flux)
             light_flux: Array = total * (1.0 + self.flux_noise * rng.standard_normal(len(flux)))
             found = CAMERA.in_view(ray) & (light_flux > self.faint * self.peak_flux)
+            ray[0] = self._wandered(ray[0], start + time_s, time_s)
             pixels = CAMERA.project(ray[found]) + self.centre_sigma_px * rng.standard_normal((int(found.sum()), 2))
             n = len(pixels)
             detections = Detections.from_points(
@@ -115,13 +119,22 @@ class Scene:
                 fixes.append((fix, self.azimuth_rad(fix.time_s - start)))
         return fixes, forward
 
-    def _beacon_flux(self, vehicle_s: float, time_s: float) -> float:
-        if not self.beacon_on:
-            return 0.0
+    def beam_rad(self, vehicle_s: float, time_s: float) -> float:
+        """Angle of the beam off the line of sight to the camera."""
         beam = self.beacon.azimuth_rad(vehicle_s - self.clock_offset_s)
-        angle = np.array([math.remainder(beam - self.azimuth_rad(time_s), math.tau)])
+        return math.remainder(beam - self.azimuth_rad(time_s), math.tau)
+
+    def _beacon_flux(self, vehicle_s: float, time_s: float) -> float:
+        if not self.beacon_on or time_s > self.beacon_until_s:
+            return 0.0
+        angle = np.array([self.beam_rad(vehicle_s, time_s)])
         g = pass_profile(angle, beam_sigma_rad(self.beacon.divergence_deg), self.widening)
         return self.peak_flux * float(g[0])
+
+    def _wandered(self, ray: Array, vehicle_s: float, time_s: float) -> Array:
+        angle = self.wander * self.beam_rad(vehicle_s, time_s)
+        x, y, z = ray.tolist()
+        return np.array([x * math.cos(angle) + z * math.sin(angle), y, z * math.cos(angle) - x * math.sin(angle)])
 
 
 def azimuth_errors_rad(fixes: list[tuple[AzimuthFix, float]]) -> Array:
