@@ -7,6 +7,7 @@ import pytest
 from perception_scenes import CAMERA
 
 from auvdock.core.contracts import Detections, Frame
+from auvdock.core.errors import ConfigError
 from auvdock.core.response import CameraResponse
 from auvdock.perception.blob import BlobCfg, BlobDetector
 from auvdock.perception.flux import spot_flux
@@ -105,3 +106,19 @@ def test_detections_carry_flux_through_selection() -> None:
     assert Detections.empty().flux is None
     with pytest.raises(ValueError, match="flux"):
         Detections.from_points(np.zeros((3, 2)), np.ones(3), np.zeros(3, dtype=np.int64), flux=np.zeros(2))
+
+
+def test_a_larger_disc_takes_in_all_of_a_broad_light() -> None:
+    """Of wings e^(-r/w) a disc of R holds 1 - (1 + R/w) e^(-R/w), less its area times the light at 1.7 R."""
+    frame, centre = _frame(0.1, 1.0, CameraResponse("sqrt")), np.array([[300.3, 140.8]])
+    focal_px = float(CAMERA.matrix[0, 0])
+    for disc_rad in (0.012, 0.018, 0.025):
+        x = disc_rad * focal_px / WIDTH_PX
+        share = float(spot_flux(frame, centre, disc_rad)[0]) / LIGHT_E_S
+        assert share == pytest.approx(1.0 - (1.0 + x) * math.exp(-x) - 0.5 * x * x * math.exp(-1.7 * x), abs=0.02)
+
+
+def test_flux_disc_must_be_a_radius() -> None:
+    """Zero and less are refused by name."""
+    with pytest.raises(ConfigError, match="flux_disc_rad"):
+        ThresholdCfg(flux_disc_rad=0.0)
