@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from importlib import import_module
 
 from auvdock.core.errors import AuvdockError
@@ -75,7 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         relax_collector()
         from auvdock.core.compiled import compiling  # half a second, not for a usage message
 
-        with compiling(_tell_of_compiling):
+        with nullcontext() if "--json" in words else compiling(_tell_of_compiling):
             return run(words[len(command) :], "auvdock " + " ".join(command))
     except AuvdockError as error:
         print(f"auvdock: error: {error}", file=sys.stderr)
