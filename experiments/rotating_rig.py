@@ -36,6 +36,7 @@ from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 __all__ = [
     "FLUX_DISC_RAD",
     "MAX_GAIN",
+    "NETWORK_PX",
     "X_M",
     "Y_M",
     "PoolRig",
@@ -55,10 +56,11 @@ MAX_GAIN = 1.64
 """Greatest gain of the rig's camera at its longest exposure, 16 ms: calibrated on the night rows of paper B's table 5.
 
 With 1.60 to 1.67 the flash is found at Y = 50 m, X = ±1.5 m in more than half of the turns and at X = ±4.5 m in fewer:
-the four places differ by 5 % of light. A fifth less and it is found on no line, a fifth more and on all."""
-_NETWORK_PX = 640
+the four places differ by 5 % of light. A fifth less and no line reaches 50 m, a fifth more and all do."""
+NETWORK_PX = 640
 FLUX_DISC_RAD = 0.025
-"""Radius of the disc in which the stand-in measures flux: no other lamp is near, and halos are broad."""
+"""Radius of the disc in which the stand-in measures flux: no other lamp is near, and halos are broad. Of 12, 25 and 50
+mrad, tried on the first video of each place."""
 _HALO_PX = 120
 _LEAST_PX = 20
 _NEAR_RAD = 0.06
@@ -147,7 +149,7 @@ class ShrunkDetector:
     Boxes and centres come back in the pixels of the whole frame.
     """
 
-    def __init__(self, detector: Detector, camera: CameraCfg, width_px: int = _NETWORK_PX) -> None:
+    def __init__(self, detector: Detector, camera: CameraCfg, width_px: int = NETWORK_PX) -> None:
         """Take the detector and the size that it is to see."""
         self._detector = detector
         self._factor = camera.width_px / width_px

@@ -13,7 +13,7 @@ from auvdock.core.camera import Camera, CameraCfg
 from auvdock.core.contracts import Detections, Proprioception
 from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.transforms import make_transform
-from auvdock.experiments.rotating_rig import DEPTH_M, FLUX_DISC_RAD, PoolRig, network_stand_in
+from auvdock.experiments.rotating_rig import DEPTH_M, FLUX_DISC_RAD, NETWORK_PX, PoolRig, network_stand_in
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.sensing import BeaconSensor
@@ -36,7 +36,6 @@ beyond some 40° from 20 m on (`rotating_rig.flash_visibility`)."""
 AREA_WEIGHT = 1.0 / 3.0
 """Weight of the area in algorithm 2, that of the shape being the rest: calibrated on the mean of paper B's table 5,
 4.72°; the paper does not give it. With a half it would be 7.6°, with a quarter 3.0°, with roundness alone 2.3°."""
-_NETWORK_PX = 640
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 """Step of the frames' phase from one seed to the next: few videos then fill the time between two frames evenly, which
 at the edge of sight decides whether a frame meets the flash. A place's first phase is random."""
@@ -242,8 +241,8 @@ def _beacons(
     rig: PoolRig, place: Place, times: list[float], scenario: Scenario, streams: list[np.random.Generator]
 ) -> tuple[Iterator[_Look], Camera]:
     """Detections without an image, for the network's own image size."""
-    height_px = round(_NETWORK_PX * rig.camera_cfg.height_px / rig.camera_cfg.width_px)
-    small = PoolRig(place.day, camera=CameraCfg(_NETWORK_PX, height_px), lamps=scenario.lamps)
+    height_px = round(NETWORK_PX * rig.camera_cfg.height_px / rig.camera_cfg.width_px)
+    small = PoolRig(place.day, camera=CameraCfg(NETWORK_PX, height_px), lamps=scenario.lamps)
     sensor = BeaconSensor(
         small.camera,
         load_water("pool"),
@@ -293,7 +292,7 @@ def _bound_deg(rig: PoolRig, forward: ForwardBeacon, look: _Look) -> float:
     """Bound for the last pass, from its own light and the background of its brightest frame."""
     last, exposure_s = forward.passes[-1], look.exposure_s or 0.0
     focal_px = float(rig.camera.matrix[0, 0])
-    shrink = rig.camera_cfg.width_px / _NETWORK_PX
+    shrink = rig.camera_cfg.width_px / NETWORK_PX
     disc_px = math.pi * (FLUX_DISC_RAD * focal_px) ** 2
     read_e = ImagingCfg().read_noise_e
     signal = PassSignal(

@@ -281,7 +281,6 @@ class Candidates:
                 wandered = float(ray @ candidate.ray_compass) < self._wander_cosine
                 if index not in of_lamps and not wandered and float(ray @ centre) >= self._flash_cosine:
                     return index
-            return self._nearest(candidate, rays)
         return self._nearest(candidate, rays)
 
     def _nearest(self, candidate: Candidate, rays: list[Array]) -> int | None:
