@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 from auvdock.experiments.kept import Kept
-from auvdock.experiments.rotating_rig import X_M, Y_M, PoolRig, network_stand_in, share_of_turns
+from auvdock.experiments.rotating_rig import RIG, X_M, Y_M, PoolRig, network_stand_in, share_of_turns
 from auvdock.experiments.rotating_tables import PAPER_AZIMUTH_DEG
 from auvdock.experiments.rotating_watch import Watch
 
@@ -74,7 +74,7 @@ def flash_sights(workers: int = 1, tick: Callable[[], object] = lambda: None, ke
     kept = kept or Kept()
     sights: list[Sight] = []
     jobs = [(x_m, day) for x_m in X_M for day in (True, False)]
-    keys: list[dict[str, object]] = [{"sight": job, "turns": SHARE_TURNS} for job in jobs]
+    keys: list[dict[str, object]] = [{"sight": job, "turns": SHARE_TURNS, "rig": RIG} for job in jobs]
     known = [kept.find(Sight, key) for key in keys]
     missing = [job for job, sight in zip(jobs, known, strict=True) if sight is None]
     with ProcessPoolExecutor(workers) as pool:

@@ -37,6 +37,7 @@ __all__ = [
     "FLUX_DISC_RAD",
     "MAX_GAIN",
     "NETWORK_PX",
+    "RIG",
     "X_M",
     "Y_M",
     "PoolRig",
@@ -63,6 +64,8 @@ FLUX_DISC_RAD = 0.025
 mrad, tried on the first video of each place."""
 _HALO_PX = 120
 _LEAST_PX = 20
+RIG = (MAX_GAIN, _HALO_PX, _LEAST_PX, FLUX_DISC_RAD)
+"""What a kept result depends on beside its place: videos of another rig are not taken for this one's."""
 _NEAR_RAD = 0.06
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.experiments.kept import Kept
-from auvdock.experiments.rotating_rig import X_M, Y_M
+from auvdock.experiments.rotating_rig import RIG, X_M, Y_M
 from auvdock.experiments.rotating_watch import SCENARIOS, Place, Scenario, Watch, watch
 
 __all__ = [
@@ -136,7 +136,7 @@ def run_videos(
     kept = kept or Kept()
     jobs = [(place, seed, turns, fidelity, scenario) for place in places for seed in range(videos)]
     names = ("place", "seed", "turns", "fidelity", "scenario")
-    keys: list[dict[str, object]] = [dict(zip(names, job, strict=True)) for job in jobs]
+    keys: list[dict[str, object]] = [{**dict(zip(names, job, strict=True)), "rig": RIG} for job in jobs]
     done: dict[int, Watch] = {}
 
     for k, key in enumerate(keys):
