@@ -173,9 +173,7 @@ class VehicleWorld(ABC):
 
     def step(self, values: Array) -> None:
         """Apply actuator commands (n,) in [-1, 1] for one control period."""
-        commands: list[float] = values.tolist()
-        for _ in range(self._steps_per_control):
-            self.simulator.step(commands)
+        self.simulator.step(values, self._steps_per_control)
         self._step_count += self._steps_per_control
         self._truth = None
         if self._latched_at_s is None and self.truth.latched:

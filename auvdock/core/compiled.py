@@ -13,14 +13,16 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["cache_folder", "compiled", "compiling"]
+__all__ = ["cache_folder", "compiled", "compiling", "external"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _numba: Any = import_module("numba")
 _events: Any = import_module("numba.core.event")
+_llvm: Any = import_module("llvmlite.binding")
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -34,6 +36,16 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def cache_folder(function: Callable[..., object]) -> str | None:
     """Where a compiled function is kept on disk; None where no folder could be written."""
     return getattr(getattr(function, "stats", None), "cache_path", None)
+
+
+def external(library: Path, name: str, addresses: int) -> Callable[..., None]:
+    """A C function of a shared library that takes so many addresses and returns nothing, for compiled code to call.
+
+    It is found by its name each time compiled code is loaded, so that code can be kept on disk.
+    """
+    _llvm.load_library_permanently(str(library))
+    types = _numba.core.types
+    return types.ExternalFunction(name, types.void(*[types.intp] * addresses))
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.sim.contacts import Contacts
-from auvdock.sim.dock import DockReport, Weld
+from auvdock.sim.dock import DockReport, Watch, Weld
 from auvdock.sim.latch import Latch
 from auvdock.sim.state import rotation_rows
 from auvdock.sim.station_geometry import station_geoms
@@ -29,6 +29,8 @@ class ConicalDock:
         self._station = station
         self._reach_m = vehicle.nose_x_m
         self._latch = Latch(station.latch, station.funnel)
+        # The latch looks at a nose behind the throat only; the station frame is not turned against the world.
+        self.watch = Watch(self._reach_m, (1.0, 0.0, 0.0), -station.funnel.length_m)
         self._nose_m = (math.inf, 0.0, 0.0)
         self._axis_angle_rad = 0.0
 

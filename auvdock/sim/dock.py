@@ -9,7 +9,7 @@ from auvdock.sim.contacts import Contacts
 from auvdock.sim.latch import Entry
 from auvdock.sim.truth import LandingTruth
 
-__all__ = ["Dock", "DockReport", "Weld"]
+__all__ = ["Dock", "DockReport", "Watch", "Weld"]
 
 
 class Weld(NamedTuple):
@@ -18,6 +18,15 @@ class Weld(NamedTuple):
     anchor_world_m: tuple[float, float, float]
     anchor_body_m: tuple[float, float, float]
     quat_wxyz: tuple[float, float, float, float]
+
+
+class Watch(NamedTuple):
+    """Where the dock has to see every physics step: while n · p ≤ offset, p on the body's x axis, world frame."""
+
+    reach_m: float
+    """x of the point p in the body frame."""
+    normal_world: tuple[float, float, float]
+    offset_m: float
 
 
 class DockReport(NamedTuple):
@@ -38,11 +47,13 @@ class Dock(Protocol):
         depth_m: depth of the station frame's origin; the frame is not turned against the world.
         free_world_m: a free place in the water, where a new simulator puts its vehicle.
         latch_time_s: time constant with which the latch pulls and holds.
+        watch: where `update` has to see every step; elsewhere it may miss steps in which nothing touches the vehicle.
     """
 
     depth_m: float
     free_world_m: tuple[float, float, float]
     latch_time_s: float
+    watch: Watch
 
     def assets(self) -> list[str]:
         """MJCF elements of the `asset` section that the station's geoms need beyond the common materials."""

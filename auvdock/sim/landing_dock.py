@@ -10,13 +10,17 @@ from auvdock.core.arrays import Array
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.sim.contacts import Contacts
-from auvdock.sim.dock import DockReport, Weld
+from auvdock.sim.dock import DockReport, Watch, Weld
 from auvdock.sim.landing_geometry import landing_geoms
 from auvdock.sim.landing_latch import LandingLatch, Posture
 from auvdock.sim.state import rotation_rows
 from auvdock.sim.truth import LandingTruth
 
 __all__ = ["LandingDock"]
+
+
+_WATCH_M = 3.0
+"""Height of the body's origin over its place, above which no hull reaches down to the station."""
 
 
 class LandingDock:
@@ -34,6 +38,8 @@ class LandingDock:
         self._seat_body_m = tuple(float(part) for part in vehicle.seat_body_m)
         self._place_z_m = station.guide.seat_height_m - station.depth_m
         self._latch = LandingLatch(station.latch)
+        # Well before anything can touch: the touchdown takes its speed from the step before.
+        self.watch = Watch(0.0, (0.0, 0.0, 1.0), self._place_z_m + _WATCH_M)
         self._last_down_m_s = 0.0
         self._nose_m = (0.0, 0.0, 0.0)
         self._posture = Posture((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
+from auvdock.sim.stepping import flow
 
 __all__ = ["CurrentCfg", "Ocean"]
 
@@ -46,7 +48,12 @@ class Ocean:
     """The water's velocity at the vehicle.
 
     Gusts are a first-order Gauss-Markov process, T ġ + g = white noise (Fossen 2011, section 8.3), uniform in space
-    and discretised exactly: g[k+1] = e^(−dt/T) g[k] + σ √(1 − e^(−2 dt/T)) n[k].
+    and discretised exactly (`stepping.blow`).
+
+    Attributes:
+        current: (6,) mean velocity (2) in m/s, its shear per metre and the depth in m at which it holds, and the gusts'
+            decay e^(−dt/T) and drive σ √(1 − e^(−2 dt/T)) in m/s.
+        gust: (2,) present gust, world frame, m/s; the simulator's steps advance it.
     """
 
     def __init__(self, cfg: CurrentCfg, reference_depth_m: float, dt_s: float) -> None:
@@ -64,31 +71,30 @@ class Ocean:
     def reset(self, cfg: CurrentCfg, rng: np.random.Generator) -> None:
         """Start anew, with gusts drawn from their stationary distribution."""
         azimuth = math.radians(cfg.direction_deg)
-        self._mean_x = cfg.speed_m_s * math.cos(azimuth)
-        self._mean_y = cfg.speed_m_s * math.sin(azimuth)
-        self._shear = cfg.shear_per_m
-        self._std = cfg.gust_std_m_s
-        self._decay = math.exp(-self._dt_s / cfg.gust_time_constant_s)
-        self._drive = cfg.gust_std_m_s * math.sqrt(1.0 - self._decay * self._decay)
+        decay = math.exp(-self._dt_s / cfg.gust_time_constant_s)
+        mean = cfg.speed_m_s * math.cos(azimuth), cfg.speed_m_s * math.sin(azimuth)
+        drive = cfg.gust_std_m_s * math.sqrt(1.0 - decay * decay)
+        self.current = np.array([*mean, cfg.shear_per_m, self._reference_depth_m, decay, drive])
+        self.gust: Array = np.zeros(2)
         self._rng = rng
-        self._block: list[float] = []
-        self._gust_x = self._gust_y = 0.0
-        if self._std > 0.0:
-            self._gust_x, self._gust_y = (self._std * rng.standard_normal(2)).tolist()
+        self._gusty = cfg.gust_std_m_s > 0.0
+        self._noise: Array = np.zeros((0, 2))
+        if self._gusty:
+            self.gust[:] = cfg.gust_std_m_s * rng.standard_normal(2)
 
-    def velocity(self, z_world_m: float) -> tuple[float, float, float]:
-        """Velocity of the water in the world frame, m/s, at a height z (0 at the surface, negative below)."""
-        factor = max(0.0, 1.0 + self._shear * (z_world_m + self._reference_depth_m)) if self._shear else 1.0
-        return factor * self._mean_x + self._gust_x, factor * self._mean_y + self._gust_y, 0.0
+    def velocity(self, z_world_m: float) -> Array:
+        """(3,) velocity of the water in the world frame, m/s, at a height z (0 at the surface, negative below)."""
+        water = np.zeros(3)
+        flow(z_world_m, self.current, self.gust, water)
+        return water
 
-    def step(self) -> tuple[float, float]:
-        """Advance the gusts by one step; returns their horizontal acceleration over it in m/s²."""
-        if self._std == 0.0:
-            return 0.0, 0.0
-        if not self._block:
-            self._block = self._rng.standard_normal(2 * _BLOCK).tolist()
-        x = self._decay * self._gust_x + self._drive * self._block.pop()
-        y = self._decay * self._gust_y + self._drive * self._block.pop()
-        acceleration = (x - self._gust_x) / self._dt_s, (y - self._gust_y) / self._dt_s
-        self._gust_x, self._gust_y = x, y
-        return acceleration
+    def noise(self, steps: int) -> Array:
+        """(m, 2) normal numbers that drive the next gusts, a row a step, m from 1 to `steps`; (0, 2) without gusts."""
+        if self._gusty and not len(self._noise):
+            # Taken from the end, as ever: the same seed gives the same gusts in every version.
+            self._noise = np.ascontiguousarray(self._rng.standard_normal(2 * _BLOCK)[::-1]).reshape(_BLOCK, 2)
+        return self._noise[:steps]
+
+    def used(self, steps: int) -> None:
+        """Take note that so many rows of `noise` have driven the gusts."""
+        self._noise = self._noise[steps:]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import ConfigError
 
@@ -82,33 +83,47 @@ class Sensors:
         self,
         time_s: float,
         depth_m: float,
-        euler_zyx_rad: tuple[float, float, float],
+        euler_zyx_rad: Array,
         nu_body: Array,
         nu_relative_body: Array,
         switch_force_n: float,
         latched: bool,
     ) -> Proprioception:
-        """One sample of all sensors."""
-        # In plain floats: for a dozen numbers that takes a third of the time of array operations.
-        error: list[float] = (self._bias + self._std * self._rng.standard_normal(13)).tolist()
-        roll, pitch, yaw = euler_zyx_rad
-        nu: list[float] = nu_body.tolist()
-        relative: list[float] = nu_relative_body.tolist()
-        scale = self._scale
-        readings = (
-            *(roll + error[1], pitch + error[2], math.remainder(yaw + error[3] + self._datum_rad, 2.0 * math.pi)),
-            *(nu[3] + error[4], nu[4] + error[5], nu[5] + error[6]),
-            *(scale * nu[0] + error[7], scale * nu[1] + error[8], scale * nu[2] + error[9]),
-            *(scale * relative[0] + error[10], scale * relative[1] + error[11], scale * relative[2] + error[12]),
+        """One sample of all sensors; angles (3,) in rad, velocities (6,) in m/s and rad/s."""
+        noise = self._rng.standard_normal(13)
+        readings = _readings(
+            self._bias, self._std, noise, euler_zyx_rad, nu_body, nu_relative_body, self._scale, self._datum_rad
         )
-        samples = np.array(readings)
         return Proprioception(
             time_s=time_s,
-            depth_m=depth_m + error[0],
-            euler_zyx_rad=samples[0:3],
-            angular_velocity_rad_s=samples[3:6],
-            velocity_ground_m_s=samples[6:9],
-            velocity_water_m_s=samples[9:12],
+            depth_m=depth_m + float(readings[0]),
+            euler_zyx_rad=readings[1:4],
+            angular_velocity_rad_s=readings[4:7],
+            velocity_ground_m_s=readings[7:10],
+            velocity_water_m_s=readings[10:13],
             contact=switch_force_n > self._cfg.contact_threshold_n,
             latched=latched,
         )
+
+
+@compiled
+def _readings(
+    bias: Array,
+    std: Array,
+    noise: Array,
+    euler_zyx_rad: Array,
+    nu_body: Array,
+    nu_relative_body: Array,
+    scale: float,
+    datum_rad: float,
+) -> Array:
+    """(13,) error of the depth, and what the other sensors say: three each of angles, rates and both velocities."""
+    out = bias + std * noise
+    for i in range(3):
+        out[1 + i] += euler_zyx_rad[i]
+        out[4 + i] += nu_body[3 + i]
+        out[7 + i] += scale * nu_body[i]
+        out[10 + i] += scale * nu_relative_body[i]
+    yaw = out[3] + datum_rad
+    out[3] = yaw - 2.0 * math.pi * np.rint(yaw / (2.0 * math.pi))
+    return out

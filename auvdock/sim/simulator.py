@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -14,18 +12,18 @@ from auvdock.core.arrays import Array, check_shape
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import ConfigError
 from auvdock.core.stations import StationCfg
-from auvdock.core.transforms import euler_zyx_from_rotation, make_transform
+from auvdock.core.transforms import make_transform, rotation_from_quat_wxyz
 from auvdock.core.vehicle import VehicleCfg, load_vehicle
 from auvdock.sim.actuation import Actuators
 from auvdock.sim.contacts import Contacts
 from auvdock.sim.dock import Weld
 from auvdock.sim.docks import make_dock
 from auvdock.sim.hydrodynamics import Hydrodynamics
-from auvdock.sim.mj import MjData, mujoco
+from auvdock.sim.mj import MjData, addresses, mujoco
 from auvdock.sim.ocean import CurrentCfg, Ocean
 from auvdock.sim.scene import LATCH, VEHICLE, build_model
 from auvdock.sim.sensors import SensorCfg, Sensors
-from auvdock.sim.state import is_absurd, rotation_rows
+from auvdock.sim.stepping import ROW, advance, is_absurd, motion
 from auvdock.sim.truth import Truth
 
 __all__ = ["HistoryEntry", "SimCfg", "Simulator"]
@@ -64,10 +62,9 @@ class HistoryEntry(NamedTuple):
 class Simulator:
     """Steps the world; `truth` is for metrics, `proprioception` for the vehicle.
 
-    Each step: `mj_step1`, M_A into the free joint's 6×6 block of `data.M`, `mj_factorM`, the water's forces into
-    `qfrc_applied`, `mj_step2`. A state that is not finite or absurd (faster than 10 m/s or 50 rad/s, further than
-    200 m from the origin) freezes the simulator at the last sane state: `truth.diverged` is True, and `history` keeps
-    the last 240 steps with the absurd state as its last entry.
+    Each step adds M_A to MuJoCo's mass matrix and the water's forces to its others (`stepping.advance`). A state that
+    is not finite or absurd (faster than 10 m/s or 50 rad/s, further than 200 m from the origin) freezes the simulator
+    at the last sane state: `truth.diverged` is True.
 
     Attributes:
         cfg: configuration.
@@ -75,7 +72,6 @@ class Simulator:
         vehicle: the vehicle.
         model: the MuJoCo model; its own to each simulator.
         T_world_station: (4, 4) pose of the station frame.
-        history: ring buffer of the last steps.
     """
 
     def __init__(self, cfg: SimCfg, station: StationCfg, vehicle: VehicleCfg | None = None) -> None:
@@ -97,7 +93,6 @@ class Simulator:
         self.model = build_model(self.vehicle, self._dock, self._dt_s)
         self._data = mujoco.MjData(self.model)
         self.T_world_station = make_transform(np.eye(3), np.array([0.0, 0.0, -station.depth_m]))
-        self.history: deque[HistoryEntry] = deque(maxlen=_HISTORY_STEPS)
         self._actuators = Actuators(self.vehicle, self._dt_s)
         self._hydrodynamics = Hydrodynamics(self.vehicle, self._actuators.thrusters)
         self._ocean = Ocean(cfg.current, station.depth_m, self._dt_s)
@@ -105,8 +100,13 @@ class Simulator:
         self._contacts = Contacts(self.model, self._data, self.vehicle.nose_x_m, self.vehicle.radius_m)
         self._weld = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_EQUALITY, LATCH)
         self._body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
+        hydrodynamics, watch = self._hydrodynamics, self._dock.watch
+        water = hydrodynamics.displaced_kg, hydrodynamics.buoyancy_n, self._dt_s
+        self._constants = np.array([*water, watch.reach_m, *watch.normal_world, watch.offset_m])
+        self._totals: Array = np.zeros(2)
+        self._ring: Array = np.zeros((_HISTORY_STEPS, ROW + len(self.vehicle.actuators)))
         self._truth: Truth | None = None
-        self._motion_now: tuple[Array, Array, Array, Array] | None = None
+        self._motion_now: Array | None = None
         self._bind()
         self.reset(np.array(self._dock.free_world_m), np.array([0.0, 0.0, 0.0, 1.0]), np.random.default_rng(0))
 
@@ -116,12 +116,14 @@ class Simulator:
         self._qpos, self._qvel = data.qpos, data.qvel
         self._mass = data.M[:21]
         self._xmat = data.xmat[self._body].reshape(3, 3)
-        self._applied = data.qfrc_applied
+        self._applied = data.qfrc_applied[:6]
+        self._constraint = data.qfrc_constraint[:3]
+        self._addresses = addresses(self.model, data)
         self._contacts.bind(data)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the views."""
-        views = ("_qpos", "_qvel", "_mass", "_xmat", "_applied")
+        views = ("_qpos", "_qvel", "_mass", "_xmat", "_applied", "_constraint", "_addresses")
         return {key: value for key, value in self.__dict__.items() if key not in views}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -169,8 +171,8 @@ class Simulator:
             raise ValueError("quat_wxyz has no length")
         nu = np.zeros(6) if nu_relative_body is None else nu_relative_body
         check_shape("nu_relative_body", nu, (6,))
-        qpos = [*position_world_m.tolist(), *(quat_wxyz / length).tolist()]
-        if is_absurd(qpos, nu.tolist()):
+        qpos = np.concatenate([position_world_m, quat_wxyz / length]).astype(np.float64)
+        if is_absurd(qpos, nu.astype(np.float64)):
             raise ValueError(f"cannot start at {position_world_m} with {nu}")
         water_rng, sensor_rng = rng.spawn(2)
         mujoco.mj_resetData(self.model, self._data)
@@ -179,51 +181,61 @@ class Simulator:
         self._actuators.reset()
         self._dock.reset()
         self._qpos[:] = qpos
-        rotation = np.array(rotation_rows(*qpos[3:])).reshape(3, 3)
-        self._qvel[:3] = np.array(self._ocean.velocity(qpos[2])) + rotation @ nu[:3]
+        self._qvel[:3] = self._ocean.velocity(float(qpos[2])) + rotation_from_quat_wxyz(qpos[3:]) @ nu[:3]
         self._qvel[3:] = nu[3:]
         self._steps = 0
         self._diverged = False
         self._contacts.reset()
-        self._energy_j = self._path_length_m = 0.0
-        self.history.clear()
+        self._totals[:] = 0.0
+        self._absurd: list[HistoryEntry] = []
         mujoco.mj_forward(self.model, self._data)
         self._poses_stale = False
         self._observe()
 
-    def step(self, command: Array | Sequence[float]) -> None:
-        """Advance by one physics step under the actuator commands (n,) in [-1, 1].
+    def step(self, command: Array | Sequence[float], steps: int = 1) -> None:
+        """Advance by physics steps under the actuator commands (n,) in [-1, 1].
 
         Does nothing once diverged.
 
         Raises:
             ValueError: a command of the wrong length or with values that are not numbers.
         """
-        if self._diverged:
-            return
-        model, data = self.model, self._data
-        state = self._actuators.step(command)
-        values: list[float] = command.tolist() if isinstance(command, np.ndarray) else list(command)
-        qpos: list[float] = self._qpos.tolist()
-        qvel: list[float] = self._qvel.tolist()
-        self.history.append(HistoryEntry(self.time_s, qpos, qvel, values))
-        if (qpos, qvel) != self._sane and is_absurd(qpos, qvel):  # somebody wrote to the data
-            self._freeze()
-            return
-        mujoco.mj_step1(model, data)
-        rotation = self._xmat
-        water = self._ocean.velocity(qpos[2])
-        wrench, advance = self._hydrodynamics.wrench(rotation, self._qvel, water, self._ocean.step(), state)
-        self._hydrodynamics.add_mass(self._mass, rotation)
-        mujoco.mj_factorM(model, data)
-        self._applied[...] = wrench
-        mujoco.mj_step2(model, data)
-        self._poses_stale = True
-        self._steps += 1
-        self._energy_j += self._actuators.power_w(advance) * self._dt_s
-        self._path_length_m += math.sqrt(qvel[0] ** 2 + qvel[1] ** 2 + qvel[2] ** 2) * self._dt_s
-        self._contacts.update()
-        self._observe()
+        values = self._actuators.checked(command)
+        while steps > 0 and not self._diverged:
+            noise = self._ocean.noise(steps)
+            made = advance(
+                *self._addresses,
+                min(steps, len(noise)) or steps,
+                self._steps,
+                self._qpos,
+                self._qvel,
+                self._xmat,
+                self._mass,
+                self._applied,
+                self._constraint,
+                values,
+                self._actuators.state,
+                self._actuators.table,
+                self._hydrodynamics.weights,
+                self._hydrodynamics.added,
+                self._ocean.current,
+                self._ocean.gust,
+                noise,
+                self._constants,
+                self._totals,
+                self._ring,
+            )
+            if made < 0:
+                raise ValueError(f"command {-1 - made} is not a number")
+            if made == 0:
+                self._freeze(values.tolist())
+                return
+            self._ocean.used(made)
+            self._poses_stale = True
+            self._steps += made
+            steps -= made
+            self._contacts.update()
+            self._observe()
 
     @property
     def time_s(self) -> float:
@@ -235,19 +247,17 @@ class Simulator:
         """A snapshot of the true state; its arrays are read-only, since callers between two steps share it."""
         if self._truth is not None:
             return self._truth
-        rotation, nu, nu_relative, water = self._motion()
+        moving = self._motion()
         dock = self._dock.report()
         entry = dock.entry
-        pose, nose = np.zeros((4, 4)), np.array(dock.nose_station_m)
-        pose[:3, :3], pose[:3, 3], pose[3, 3] = rotation, self._qpos[:3], 1.0
-        pose.setflags(write=False)
+        nose = np.array(dock.nose_station_m)
         nose.setflags(write=False)
         self._truth = Truth(
             time_s=self.time_s,
-            T_world_body=pose,
-            nu_body=nu,
-            nu_relative_body=nu_relative,
-            current_world_m_s=water,
+            T_world_body=moving[:16].reshape(4, 4),
+            nu_body=moving[22:28],
+            nu_relative_body=moving[28:34],
+            current_world_m_s=moving[19:22],
             nose_station_m=nose,
             axis_angle_rad=dock.axis_angle_rad,
             contact_force_n=self._contacts.force_n,
@@ -259,8 +269,8 @@ class Simulator:
             entry_angle_rad=entry.angle_rad if entry else None,
             entry_lateral_m=entry.lateral_m if entry else None,
             entry_vertical_m=entry.vertical_m if entry else None,
-            energy_j=self._energy_j,
-            path_length_m=self._path_length_m,
+            energy_j=float(self._totals[0]),
+            path_length_m=float(self._totals[1]),
             diverged=self._diverged,
             landing=dock.landing,
         )
@@ -268,52 +278,50 @@ class Simulator:
 
     def proprioception(self) -> Proprioception:
         """One noisy sample of the vehicle's own sensors; draws from the sensors' generator."""
-        rotation, nu, nu_relative, _ = self._motion()
+        moving = self._motion()
+        pose = moving[:16].reshape(4, 4)
         return self._sensors.sample(
             time_s=self.time_s,
-            depth_m=-float(self._qpos[2]),
-            euler_zyx_rad=euler_zyx_from_rotation(rotation),
-            nu_body=nu,
-            nu_relative_body=nu_relative,
-            switch_force_n=self._dock.switch_force_n(self._contacts, self._qpos[:3], rotation),
+            depth_m=-float(moving[11]),
+            euler_zyx_rad=moving[16:19],
+            nu_body=moving[22:28],
+            nu_relative_body=moving[28:34],
+            switch_force_n=self._dock.switch_force_n(self._contacts, pose[:3, 3], pose[:3, :3]),
             latched=self._dock.latched,
         )
 
-    def _motion(self) -> tuple[Array, Array, Array, Array]:
-        """Rotation body to world, ν over ground, ν relative to the water, water's velocity; kept for a step."""
-        if self._motion_now is not None:
-            return self._motion_now
-        qpos: list[float] = self._qpos.tolist()
-        rotation = np.array(rotation_rows(*qpos[3:7])).reshape(3, 3)
-        water = np.array(self._ocean.velocity(qpos[2]))
-        velocity, spin = self._qvel[:3], self._qvel[3:6]
-        nu, nu_relative = np.empty(6), np.empty(6)
-        nu[:3] = velocity.dot(rotation)
-        nu_relative[:3] = (velocity - water).dot(rotation)
-        nu[3:] = nu_relative[3:] = spin
-        motion = rotation, nu, nu_relative, water
-        for array in motion:
-            array.setflags(write=False)
-        self._motion_now = motion
-        return motion
+    def _motion(self) -> Array:
+        """`stepping.motion` of the present state, read-only; kept for a step."""
+        if self._motion_now is None:
+            self._motion_now = motion(self._qpos, self._qvel, self._ocean.current, self._ocean.gust)
+            self._motion_now.setflags(write=False)
+        return self._motion_now
+
+    @property
+    def history(self) -> list[HistoryEntry]:
+        """The last 240 steps; once diverged, the absurd state is the last entry."""
+        kept = min(self._steps, _HISTORY_STEPS - len(self._absurd))
+        rows = [self._ring[index % _HISTORY_STEPS].tolist() for index in range(self._steps - kept, self._steps)]
+        return [HistoryEntry(row[0] * self._dt_s, row[1:8], row[8:ROW], row[ROW:]) for row in rows] + self._absurd
 
     def _observe(self) -> None:
-        """Dock, latch and divergence after a step or a reset."""
+        """Dock, latch and divergence after steps or a reset."""
         self._truth = self._motion_now = None
-        qpos: list[float] = self._qpos.tolist()
-        qvel: list[float] = self._qvel.tolist()
-        if is_absurd(qpos, qvel):
-            self.history.append(HistoryEntry(self.time_s, qpos, qvel, []))
-            self._freeze()
+        if is_absurd(self._qpos, self._qvel):
+            # The last step that was made started from a sane state.
+            row = self._ring[(self._steps - 1) % _HISTORY_STEPS]
+            self._sane = row[1:8].copy(), row[8:ROW].copy()
+            self._freeze([])
             return
-        self._sane = qpos, qvel
-        weld = self._dock.update(self.time_s, qpos, qvel, self._contacts)
+        self._sane = self._qpos.copy(), self._qvel.copy()
+        weld = self._dock.update(self.time_s, self._qpos.tolist(), self._qvel.tolist(), self._contacts)
         if weld is not None:
             self._close_latch(weld)
 
-    def _freeze(self) -> None:
+    def _freeze(self, command: list[float]) -> None:
         """Mark as diverged and go back to the last sane state, so that nobody downstream meets a NaN."""
         self._diverged = True
+        self._absurd = [HistoryEntry(self.time_s, self._qpos.tolist(), self._qvel.tolist(), command)]
         self._truth = self._motion_now = None
         self._qpos[:], self._qvel[:] = self._sane
         self._contacts.force_n = 0.0

@@ -7,7 +7,23 @@ from sim_bench import REMUS, trimmed
 from auvdock.core.arrays import Array
 from auvdock.core.marine import flip_matrix, flip_twist
 from auvdock.core.transforms import rotation_from_quat_wxyz
+from auvdock.core.vehicle import VehicleCfg
+from auvdock.sim.actuation import Actuators
 from auvdock.sim.hydrodynamics import Hydrodynamics
+from auvdock.sim.stepping import add_mass, wrench
+
+
+def water_wrench(
+    vehicle: VehicleCfg, rotation: Array, velocity: Array, water: Array, gust: Array, state: Array
+) -> tuple[Array, Array]:
+    """`stepping.wrench` of a vehicle: force on the free joint and advance speeds of its thrusters."""
+    actuators = Actuators(vehicle, 1.0 / 120.0)
+    hydrodynamics = Hydrodynamics(vehicle, actuators.thrusters)
+    constants = np.array([hydrodynamics.displaced_kg, hydrodynamics.buoyancy_n])
+    force, speeds = np.empty(6), np.empty(len(actuators.thrusters))
+    weights, table = hydrodynamics.weights, actuators.table
+    wrench(rotation, velocity, water, gust, state, table, weights, constants, force, speeds)
+    return force, speeds
 
 
 def skew(vector: Array) -> Array:
@@ -42,7 +58,6 @@ def damping(nu: Array) -> Array:
 def test_wrench_is_fossens_formula_written_out() -> None:
     """Against equations 6.43, 6.53 and 4.6 as plain matrices; relative tolerance 1e-12."""
     rng = np.random.default_rng(1)
-    hydrodynamics = Hydrodynamics(REMUS, (0, 1, 2, 3, 4))
     mass = REMUS.added_mass_body
     for _ in range(200):
         rotation, nu = random_rotation(rng), random_nu(rng)
@@ -53,13 +68,8 @@ def test_wrench_is_fossens_formula_written_out() -> None:
         body += mass[:, :3] @ (np.cross(nu[3:], nu[:3]) + rotation.T @ gust)
         expected = np.concatenate([rotation @ body[:3], body[3:]])
         expected[:3] += np.array([0.0, 0.0, REMUS.buoyancy_n]) + REMUS.buoyancy_n / 9.81 * gust
-        got, advance = hydrodynamics.wrench(
-            rotation,
-            np.concatenate([rotation @ nu[:3] + water, nu[3:]]),
-            (water[0], water[1], water[2]),
-            (gust[0], gust[1]),
-            actuators,
-        )
+        velocity = np.concatenate([rotation @ nu[:3] + water, nu[3:]])
+        got, advance = water_wrench(REMUS, rotation, velocity, water, gust[:2], actuators)
         np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-10)
         # Advance speed of the stern propeller is u, of the fore lateral (thrust to starboard) −(v + x r).
         np.testing.assert_allclose(advance[:2], [nu[0], -(nu[1] + 0.35 * nu[5])], atol=1e-12)
@@ -116,12 +126,12 @@ def test_mass_matrices_are_symmetric_positive_definite() -> None:
 def test_added_mass_rows_turn_with_the_body() -> None:
     """Kinetic energy of the water is the same in the free joint's coordinates as in body axes (1e-12)."""
     rng = np.random.default_rng(3)
-    hydrodynamics = Hydrodynamics(trimmed(), ())
+    added = Hydrodynamics(trimmed(), ()).added
     for _ in range(50):
         rotation, nu = random_rotation(rng), random_nu(rng)
         lower = np.zeros((6, 6))
         rows = np.zeros(21)
-        hydrodynamics.add_mass(rows, rotation)
+        add_mass(rows, rotation, added)
         lower[np.tril_indices(6)] = rows
         mass = lower + lower.T - np.diag(np.diag(lower))
         joint = np.concatenate([rotation @ nu[:3], nu[3:]])
@@ -131,15 +141,14 @@ def test_added_mass_rows_turn_with_the_body() -> None:
 def test_mirror_image_gives_the_mirrored_wrench() -> None:
     """Port and starboard are alike: reflecting (v, p, r) and the lateral actuators reflects (Y, K, N); 1e-12."""
     rng = np.random.default_rng(4)
-    hydrodynamics = Hydrodynamics(REMUS, (0,))
     mirror = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     sides = np.array([-1.0 if "lateral" in name or name == "rudder" else 1.0 for name in REMUS.actuator_names])
-    identity, still = np.eye(3), (0.0, 0.0, 0.0)
+    identity, still = np.eye(3), np.zeros(3)
     for _ in range(100):
         nu, actuators = random_nu(rng), rng.uniform(-1.0, 1.0, 7)
-        left = hydrodynamics.wrench(identity, nu, still, (0.0, 0.0), actuators)[0]
+        left = water_wrench(REMUS, identity, nu, still, still[:2], actuators)[0]
         turned = mirror * nu
-        right = hydrodynamics.wrench(identity, turned, still, (0.0, 0.0), sides * actuators)[0]
+        right = water_wrench(REMUS, identity, turned, still, still[:2], sides * actuators)[0]
         np.testing.assert_allclose(mirror * left, right, atol=1e-12)
 
 

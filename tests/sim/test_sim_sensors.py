@@ -17,12 +17,13 @@ from auvdock.sim.sensors import SensorCfg, Sensors
 from auvdock.sim.simulator import SimCfg, Simulator
 
 QUIET = SensorCfg(**{name: 0.0 for name in vars(SensorCfg())})
+EULER = np.array([0.02, -0.03, 3.1])
 NU = np.array([0.5, 0.1, -0.05, 0.01, 0.02, 0.1])
 NU_RELATIVE = np.array([0.4, 0.2, -0.05, 0.01, 0.02, 0.1])
 
 
 def sample(sensors: Sensors) -> Proprioception:
-    return sensors.sample(1.0, 8.0, (0.02, -0.03, 3.1), NU, NU_RELATIVE, 0.0, False)
+    return sensors.sample(1.0, 8.0, EULER, NU, NU_RELATIVE, 0.0, False)
 
 
 def stacked(sensed: Proprioception) -> Array:

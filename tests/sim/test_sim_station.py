@@ -12,6 +12,7 @@ from sim_bench import REMUS, STATION, command, run, simulator, start, state
 from auvdock.core.arrays import Array
 from auvdock.sim.docks import make_dock
 from auvdock.sim.mj import mujoco
+from auvdock.sim.ocean import CurrentCfg
 from auvdock.sim.scene import scene_xml
 from auvdock.sim.simulator import Simulator
 from auvdock.sim.station_geometry import STAVES, TUBE_STAVES, inner_radius_m
@@ -210,3 +211,22 @@ def test_looking_at_the_state_does_not_change_the_run() -> None:
         assert looked.data.time >= 0.0
         assert looked.truth.time_s > 0.0
     assert np.array_equal(state(looked), state(alone))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_steps_made_at_once_are_the_steps_made_one_by_one(seed: int) -> None:
+    """Through the mouth, along the wall and into the latch in gusts: every bit, the entry and the history alike."""
+    gusts = CurrentCfg(0.02, 90.0, gust_std_m_s=0.01)
+    at_once, one_by_one = simulator(REMUS, STATION, gusts), simulator(REMUS, STATION, gusts)
+    for sim in (at_once, one_by_one):
+        start(sim, (1.5, 0.12, -DEPTH), (0.0, 0.0, 180.0), np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]), seed)
+    for _ in range(450):
+        at_once.step(command(at_once, stern=0.4), 4)
+        for _ in range(4):
+            one_by_one.step(command(one_by_one, stern=0.4))
+        assert np.array_equal(state(at_once), state(one_by_one))
+    one, other = at_once.truth, one_by_one.truth
+    assert one.peak_contact_force_n == other.peak_contact_force_n > 0.0
+    assert (one.entry_speed_m_s, one.energy_j, one.docked) == (other.entry_speed_m_s, other.energy_j, other.docked)
+    assert one.docked
+    assert at_once.history == one_by_one.history
