@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,6 @@ __all__ = [
     "draw_detections",
     "load_detection_model",
     "merge_close",
-    "squared_distances",
     "veiled_share",
 ]
 
@@ -73,6 +73,9 @@ class FlashModelCfg:
                 raise ConfigError(f"detection.flash.{name}", getattr(self, name), "0 or more")
 
 
+_FLASH = FlashModelCfg()
+
+
 @dataclass(frozen=True)
 class DetectionModelCfg:
     """Behaviour of one detector.
@@ -111,6 +114,14 @@ class DetectionModelCfg:
     """Share of detections of the wrong class."""
     flash: FlashModelCfg | None = None
     """Towards a rotating beacon; None: the defaults of `FlashModelCfg`."""
+
+    @cached_property
+    def numbers(self) -> Array:
+        """(10,) what compiled code takes: finding (4), measuring (4), finding a rotating beacon (2)."""
+        ways = self.flash or _FLASH
+        found = self.contrast_50_dn, self.surround_factor, self.slope, self.ceiling
+        measured = self.centre_at_100, self.centre_floor_px, self.score_gain, self.wrong_colour
+        return np.array([*found, *measured, ways.contrast_50_dn, ways.slope])
 
     def __post_init__(self) -> None:
         """Refuse what is no probability or no width."""
@@ -171,9 +182,6 @@ class Candidates(NamedTuple):
     light_noise_e_s: Array | None = None
 
 
-_FLASH = FlashModelCfg()
-
-
 def load_detection_model(name: str) -> DetectionModelCfg:
     """The fitted model of a detector.
 
@@ -201,41 +209,31 @@ def draw_detections(
     merged = merge_close(seen, model)
     contrast = merged.contrast_dn
     flash, ways = seen.flash, model.flash or _FLASH
-    index = _found(
-        contrast,
-        merged.surround_dn,
-        chance[0],
-        (model.contrast_50_dn, model.surround_factor, model.slope, model.ceiling),
-        flash.place if flash is not None else -1,
-        (ways.contrast_50_dn, ways.slope),
-    )
-    index = index[(-contrast[index]).argsort(kind="stable")]
-    centre, half, score, class_id = _measured(
-        index,
+    index, centre, xyxy, score, class_id = _drawn(
         merged.pixels,
         contrast,
+        merged.surround_dn,
         merged.noise_dn,
         merged.width_px,
         merged.radius_px,
         merged.red,
         noise,
-        chance[1],
-        (model.centre_at_100, model.centre_floor_px, model.score_gain, model.wrong_colour),
+        chance,
+        flash.place if flash is not None else -1,
+        model.numbers,
     )
     if flash is not None and flash.place in index:
         place = int(np.flatnonzero(index == flash.place)[0])
-        half[place] = np.maximum(half[place], ways.box_scale * flash.half_px)
+        half = np.maximum(0.5 * (xyxy[place, 2:] - xyxy[place, :2]), ways.box_scale * flash.half_px)
         noise_over_contrast = 10.0 * float(merged.noise_dn[flash.place] / contrast[flash.place])
-        spread_px = ways.centre_spread * noise_over_contrast * float(half[place].mean())
+        spread_px = ways.centre_spread * noise_over_contrast * float(half.mean())
         centre[place] += ways.centre_shift * flash.shift_px + spread_px * rng.standard_normal(2)
+        xyxy[place, :2], xyxy[place, 2:] = centre[place] - half, centre[place] + half
     flux = None
     if merged.light_e_s is not None and merged.light_noise_e_s is not None:
         draws = rng.standard_normal((2, len(index)))
         light = merged.light_e_s[index] * np.exp(ways.flux_spread * draws[0])
         flux = np.maximum(light + merged.light_noise_e_s[index] * draws[1], 0.0)
-    xyxy = np.empty((len(index), 4))
-    np.subtract(centre, half, out=xyxy[:, :2])
-    np.add(centre, half, out=xyxy[:, 2:])
     if alarms:
         ghosts = seen.pixels[rng.integers(0, m, alarms)] + rng.normal(0.0, _HAZE_PX, (alarms, 2))
         ghosts = np.clip(ghosts, -0.5, np.array(size_px) - 0.5)
@@ -249,68 +247,54 @@ def draw_detections(
 
 
 @compiled
-def _found(
-    contrast: Array,
-    surround: Array,
-    chance: Array,
-    model: tuple[float, float, float, float],
-    flash: int,
-    flash_model: tuple[float, float],
-) -> IntArray:
-    """(k,) lights of m that the detector finds; `flash` is the rotating beacon's place, -1 for none."""
-    contrast_50, surround_factor, slope, ceiling = model
-    found = np.empty(len(contrast), dtype=np.int64)
-    count = 0
-    for i in range(len(contrast)):
-        if contrast[i] <= _LEAST_DN:
-            continue
-        odds = ((contrast_50 + surround_factor * surround[i]) / contrast[i]) ** slope
-        if i == flash:
-            odds = (flash_model[0] / contrast[i]) ** flash_model[1]
-        if (1.0 + odds) * chance[i] < ceiling:
-            found[count] = i
-            count += 1
-    return found[:count]
-
-
-@compiled
-def _measured(
-    index: IntArray,
+def _drawn(
     pixels: Array,
     contrast: Array,
+    surround: Array,
     noise_dn: Array,
     width_px: Array,
     radius_px: Array,
     red: BoolArray,
     noise: Array,
     chance: Array,
-    model: tuple[float, float, float, float],
-) -> tuple[Array, Array, Array, IntArray]:
-    """Centres and half sides (k, 2), scores and classes (k,) of the lights `index` (k,) of m."""
-    centre_at_100, centre_floor_px, score_gain, wrong_colour = model
-    centre, half = np.empty((len(index), 2)), np.empty((len(index), 2))
-    score, class_id = np.empty(len(index)), np.empty(len(index), dtype=np.int64)
-    for k in range(len(index)):
+    flash: int,
+    model: Array,
+) -> tuple[IntArray, Array, Array, Array, IntArray]:
+    """Which lights (k,) of m the detector finds, brightest first; their centres (k, 2), boxes (k, 4), scores, classes.
+
+    `flash` is the rotating beacon's place, -1 for none; `model` is `DetectionModelCfg.numbers`.
+    """
+    contrast_50, surround_factor, slope, ceiling = model[0], model[1], model[2], model[3]
+    found, count = np.empty(len(contrast), dtype=np.int64), 0
+    for i in range(len(contrast)):
+        if contrast[i] <= _LEAST_DN:
+            continue
+        odds = ((contrast_50 + surround_factor * surround[i]) / contrast[i]) ** slope
+        if i == flash:
+            odds = (model[8] / contrast[i]) ** model[9]
+        if (1.0 + odds) * chance[0, i] >= ceiling:
+            continue
+        place = count
+        while place > 0 and contrast[found[place - 1]] < contrast[i]:
+            found[place] = found[place - 1]
+            place -= 1
+        found[place] = i
+        count += 1
+    index = found[:count]
+    centre_at_100, centre_floor_px, score_gain, wrong_colour = model[4], model[5], model[6], model[7]
+    centre, xyxy = np.empty((count, 2)), np.empty((count, 4))
+    score, class_id = np.empty(count), np.empty(count, dtype=np.int64)
+    for k in range(count):
         i = index[k]
         spread = math.hypot(width_px[i] * centre_at_100 * 1e4 / contrast[i] ** 2, centre_floor_px)
+        half = max(radius_px[i], width_px[i])
         for axis in range(2):
             centre[k, axis] = pixels[i, axis] + spread * noise[i, axis]
-            half[k, axis] = max(radius_px[i], width_px[i])
+            xyxy[k, axis], xyxy[k, 2 + axis] = centre[k, axis] - half, centre[k, axis] + half
         snr = score_gain * contrast[i] / noise_dn[i]
         score[k] = snr / (snr + 10.0)
-        class_id[k] = 1 if red[i] != (chance[i] < wrong_colour) else 0
-    return centre, half, score, class_id
-
-
-@compiled
-def squared_distances(pixels: Array) -> Array:
-    """(m, m) squared distances between points (m, 2)."""
-    distance2 = np.empty((len(pixels), len(pixels)))
-    for i in range(len(pixels)):
-        for j in range(len(pixels)):
-            x, y = pixels[i, 0] - pixels[j, 0], pixels[i, 1] - pixels[j, 1]
-            distance2[i, j] = x * x + y * y
-    return distance2
+        class_id[k] = 1 if red[i] != (chance[1, i] < wrong_colour) else 0
+    return index, centre, xyxy, score, class_id
 
 
 def veiled_share(seen: Candidates) -> float:

@@ -73,75 +73,66 @@ class LightSet:
         self.peak_w_sr = np.array([peak_intensity_w_sr(lamp) for lamp in lamps])
         self.flux_w = np.array([lamp.power_w * lamp.efficiency for lamp in lamps])
         half = np.radians([lamp.beam_angle_deg for lamp in lamps]) / 2.0
-        self._minus_profile = -math.log(2.0) / half**2
+        minus_profile = -math.log(2.0) / half**2
         self.absorption_per_m = np.array([water.absorption_at(lamp.wavelength_nm) for lamp in lamps])
         self.scattering_per_m = np.array([water.scattering_at(lamp.wavelength_nm) for lamp in lamps])
         self.electrons_per_j = np.array([electrons_per_joule(lamp.wavelength_nm) for lamp in lamps])
         array = layout.array_positions_m
-        self._rim_x = float(np.mean(array[:, 0]))
-        self._rim_centre = array[:, 1:].mean(axis=0)
-        self._rim_radius2 = float(np.max(np.sum((array[:, 1:] - self._rim_centre) ** 2, axis=1)))
-        setback = self._rim_x - self.positions_m[:, 0]
-        inside = np.sum((self.positions_m[:, 1:] - self._rim_centre) ** 2, axis=1) < self._rim_radius2
-        self._recessed = np.flatnonzero(((setback > 0.05) & inside & funnel)[: self.station_count])
-        places = self.positions_m[self._recessed, 1:] - self._rim_centre
-        # In plain floats, since there are few of them.
-        self._behind: list[tuple[int, float, float, float]] = [
-            (int(index), float(setback[index]), float(y), float(z))
-            for index, (y, z) in zip(self._recessed, places, strict=True)
-        ]
+        rim_x, rim_centre = float(np.mean(array[:, 0])), array[:, 1:].mean(axis=0)
+        rim_radius2 = float(np.max(np.sum((array[:, 1:] - rim_centre) ** 2, axis=1)))
+        setback = rim_x - self.positions_m[:, 0]
+        inside = np.sum((self.positions_m[:, 1:] - rim_centre) ** 2, axis=1) < rim_radius2
+        recessed = np.flatnonzero(((setback > 0.05) & inside & funnel)[: self.station_count])
+        # Of each lamp inside the funnel its index, how far it is set back and where it lies from the rim's centre.
+        places = self.positions_m[recessed, 1:] - rim_centre
+        self._behind = np.column_stack([recessed.astype(np.float64), setback[recessed], places])
+        self._rim = np.array([rim_x, *rim_centre, rim_radius2])
+        lamps_of = minus_profile, self.absorption_per_m, self.scattering_per_m, self.peak_w_sr
+        self._lamps = np.column_stack([self.positions_m, self.axes, *lamps_of])
 
     def received(self, T_station_camera: Array) -> Received:
         """Core and halo irradiance of every lamp at a camera pose (4, 4)."""
-        ray, range_m, depth, total = _received(
-            T_station_camera,
-            self.positions_m,
-            self.axes,
-            self._minus_profile,
-            self.absorption_per_m,
-            self.scattering_per_m,
-            self.peak_w_sr,
-        )
-        camera = T_station_camera[:3, 3]
-        ahead = float(camera[0]) - self._rim_x
-        if ahead > 0.0 and self._behind:
-            to_y, to_z = (camera[1:] - self._rim_centre).tolist()
-            for index, setback, y, z in self._behind:
-                share = setback / (setback + ahead)
-                across, up = y * (1.0 - share) + to_y * share, z * (1.0 - share) + to_z * share
-                if across * across + up * up > self._rim_radius2:
-                    total[index] = 0.0
-        core = total * np.exp(-depth)
-        return Received(ray, range_m, depth, core, total - core)
+        ray, parts = _received(T_station_camera, self._lamps, self._behind, self._rim)
+        return Received(ray, parts[0], parts[1], parts[2], parts[3])
 
 
 @compiled
-def _received(
-    T_station_camera: Array,
-    positions_m: Array,
-    axes: Array,
-    minus_profile: Array,
-    absorption_per_m: Array,
-    scattering_per_m: Array,
-    peak_w_sr: Array,
-) -> tuple[Array, Array, Array, Array]:
-    """Rays in the camera frame (n, 3), ranges, scattering depths and irradiances (n,) that absorption leaves."""
-    count = len(positions_m)
+def _received(T_station_camera: Array, lamps: Array, behind: Array, rim: Array) -> tuple[Array, Array]:
+    """Rays in the camera frame (n, 3), and range, scattering depth, core and halo (4, n).
+
+    Args:
+        T_station_camera: (4, 4).
+        lamps: (n, 10) position, axis, factor of θ² in the beam's exponent, absorption, scattering, peak intensity.
+        behind: (k, 4) lamps inside the funnel: index, setback, y and z from the rim's centre.
+        rim: (4,) x of its plane, y and z of its centre, square of its radius.
+    """
+    count = len(lamps)
     ray, offset = np.empty((count, 3)), np.empty(3)
-    range_m, depth, total = np.empty(count), np.empty(count), np.empty(count)
+    parts, total = np.empty((4, count)), np.empty(count)
     for i in range(count):
         r2 = along = 0.0
         for k in range(3):
-            offset[k] = positions_m[i, k] - T_station_camera[k, 3]
+            offset[k] = lamps[i, k] - T_station_camera[k, 3]
             r2 += offset[k] * offset[k]
-            along -= offset[k] * axes[i, k]
+            along -= offset[k] * lamps[i, 3 + k]
         r2 = max(r2, _NEAREST_M2)
         r = math.sqrt(r2)
         angle = math.acos(min(max(along / r, -1.0), 1.0))
-        total[i] = peak_w_sr[i] * math.exp(minus_profile[i] * angle * angle - absorption_per_m[i] * r) / r2
-        range_m[i], depth[i] = r, scattering_per_m[i] * r
+        total[i] = lamps[i, 9] * math.exp(lamps[i, 6] * angle * angle - lamps[i, 7] * r) / r2
+        parts[0, i], parts[1, i] = r, lamps[i, 8] * r
         for k in range(3):
             ray[i, k] = 0.0
             for axis in range(3):
                 ray[i, k] += offset[axis] / r * T_station_camera[axis, k]
-    return ray, range_m, depth, total
+    ahead = T_station_camera[0, 3] - rim[0]
+    if ahead > 0.0:
+        to_y, to_z = T_station_camera[1, 3] - rim[1], T_station_camera[2, 3] - rim[2]
+        for k in range(len(behind)):
+            share = behind[k, 1] / (behind[k, 1] + ahead)
+            across, up = behind[k, 2] * (1.0 - share) + to_y * share, behind[k, 3] * (1.0 - share) + to_z * share
+            if across * across + up * up > rim[3]:
+                total[int(behind[k, 0])] = 0.0
+    for i in range(count):
+        parts[2, i] = total[i] * math.exp(-parts[1, i])
+        parts[3, i] = total[i] - parts[2, i]
+    return ray, parts

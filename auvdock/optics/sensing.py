@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from auvdock.core.arrays import Array, constant
+from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Detections
@@ -17,7 +17,6 @@ from auvdock.optics.detection_model import (
     FlashModelCfg,
     draw_detections,
     load_detection_model,
-    squared_distances,
 )
 from auvdock.optics.exposure import AutoExposure, frames_of_a_turn
 from auvdock.optics.flash import FlashOptics, with_flash
@@ -26,12 +25,11 @@ from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.scene import LitScene, View
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
-from auvdock.optics.spots import Spots
+from auvdock.optics.spots import Spots, squared_distances
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeaconSensor", "candidates_in_view"]
 
-_GREATEST_CODE, _PER_PI = constant(255.0), constant(1.0 / math.pi)
 _RED_CHANNEL = np.array(0)
 
 
@@ -118,39 +116,25 @@ def candidates_in_view(
     """
     pixels = view.pixels.compress(view.inside, 0)
     scale = lit.scale(gain)
-    model = lit.spots
-    area = model.saturated_area_px2(spots, scale.saturated_e / exposure_s)
-    share = model.share(area)
-    channel = spots.channel * exposure_s
-    best = channel.argmax(axis=1)
-    gap2 = squared_distances(pixels)
-    level = model.at_distance(spots, gap2)
-    level *= channel.T.take(best, 0)
-    around = np.add.reduce(level, axis=1)
-    own = level.diagonal().copy()
-    around -= own
+    met = lit.spots.meet(spots, pixels, exposure_s, scale.saturated_e)
+    around, share = met.around_e, met.share
     if ground_e_s is not None:
-        around += ground_e_s[best] * exposure_s
+        around += ground_e_s[met.channel] * exposure_s
     elif lit.nuisance.daylight != "none":
         veil = lit.veil_e_s(-float(view.T_world_camera[2, 3])) * exposure_s
-        around += veil[best]
+        around += veil[met.channel]
         share += veil_share(veil, scale.saturated_e)
-    electrons = np.empty((2, len(own)))
-    bright = np.add(around, own, out=electrons[0])
-    electrons[1] = around
-    codes = scale.codes(electrons)
-    np.minimum(codes, _GREATEST_CODE, out=codes)
-    contrast = codes[0] - codes[1]
+    contrast, surround, noise = scale.contrast(met.own_e, around)
     seen = Candidates(
         pixels,
         contrast,
-        codes[1],
-        scale.noise_dn(bright),
-        np.sqrt(np.maximum.reduce(area, axis=1) * _PER_PI),
+        surround,
+        noise,
+        met.radius_px,
         spots.sigma_px,
-        own,
-        gap2,
-        best == _RED_CHANNEL,
+        met.own_e,
+        met.distance2_px2,
+        met.channel == _RED_CHANNEL,
     )
     if view.beam is not None:
         seen = with_flash(lit, spots, seen, scale, exposure_s, flash_model or FlashModelCfg())

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from auvdock.core.arrays import Array, Image, constant
+from auvdock.core.arrays import Array, Image
 from auvdock.core.compiled import compiled
 from auvdock.core.response import SATURATED_CODE
 from auvdock.optics.settings import ImagingCfg
@@ -44,18 +44,25 @@ class SensorScale:
             self.saturated_e = SATURATED_CODE * self.full_scale_e / 255.0
         else:
             self.saturated_e = (SATURATED_CODE / self.dn_per_root + self.read_e) ** 2 - self._read2
-        self._codes = constant(self._read2), constant(self.read_e), constant(self.dn_per_root)
+        linear = 255.0 / self.full_scale_e if self._linear else 0.0
+        self._numbers = np.array([linear, self._read2, self.read_e, self.dn_per_root, self._noise_dn])
 
     def codes(self, electrons: Array) -> Array:
         """Unrounded, unclipped codes of electrons, any shape."""
-        if self._linear:
-            return electrons * (255.0 / self.full_scale_e)
-        read2, read, dn_per_root = self._codes
-        root = electrons + read2
-        np.sqrt(root, out=root)
-        root -= read
-        root *= dn_per_root
-        return root
+        return _codes(electrons.ravel(), self._numbers).reshape(electrons.shape)
+
+    def contrast(self, own_e: Array, around_e: Array) -> tuple[Array, Array, Array]:
+        """Lights (m,) over their surroundings, in codes clipped at 255.
+
+        Args:
+            own_e: electrons of each light at its centre.
+            around_e: electrons of everything else there.
+
+        Returns:
+            (m,) code of the centre above that of the surroundings, the latter, and the standard deviation of the
+            former, quantisation included.
+        """
+        return _contrast(own_e, around_e, self._numbers)
 
     def electrons(self, codes: Array) -> Array:
         """Electrons of codes, any shape; inverse of `codes`."""
@@ -71,11 +78,40 @@ class SensorScale:
 
     def noise_dn(self, electrons: Array) -> Array:
         """Standard deviation of the code at a signal in electrons, quantisation included."""
-        if self._linear:
-            return np.sqrt((electrons + self._read2) * (255.0 / self.full_scale_e) ** 2 + 1.0 / 12.0)
-        noise = np.empty(electrons.shape)
-        noise.fill(self._noise_dn)
-        return noise
+        return _noise_dn(electrons.ravel(), self._numbers).reshape(electrons.shape)
+
+
+@compiled
+def _codes(electrons: Array, numbers: Array) -> Array:
+    """`SensorScale.codes`, (n,)."""
+    codes = np.empty(len(electrons))
+    for i in range(len(electrons)):
+        if numbers[0] > 0.0:
+            codes[i] = electrons[i] * numbers[0]
+        else:
+            codes[i] = (math.sqrt(electrons[i] + numbers[1]) - numbers[2]) * numbers[3]
+    return codes
+
+
+@compiled
+def _noise_dn(electrons: Array, numbers: Array) -> Array:
+    """`SensorScale.noise_dn`, (n,)."""
+    noise = np.empty(len(electrons))
+    for i in range(len(electrons)):
+        noise[i] = numbers[4]
+        if numbers[0] > 0.0:
+            noise[i] = math.sqrt((electrons[i] + numbers[1]) * numbers[0] ** 2 + 1.0 / 12.0)
+    return noise
+
+
+@compiled
+def _contrast(own: Array, around: Array, numbers: Array) -> tuple[Array, Array, Array]:
+    """`SensorScale.contrast`."""
+    bright, surround = _codes(own + around, numbers), _codes(around, numbers)
+    for i in range(len(own)):
+        surround[i] = min(surround[i], 255.0)
+        bright[i] = min(bright[i], 255.0) - surround[i]
+    return bright, surround, _noise_dn(own + around, numbers)
 
 
 class Sensor:

@@ -50,21 +50,21 @@ class Contacts:
     @property
     def touching_station(self) -> bool:
         """True while the hull touches anything but the floor."""
-        contact = self._data.contact
-        if self._data.ncon == 0 or self.force_n == 0.0:
+        if self.force_n == 0.0 or self._data.ncon == 0:
             return False
+        contact = self._data.contact
         return bool(np.any(np.all(contact.geom != self._floor, axis=1) & (contact.dist < 0.0)))
 
     def bow_force_n(self, position_world_m: Array, axis_world: Array) -> float:
         """`force_n` while any contact lies on the rounded bow, else 0."""
-        if self._data.ncon == 0 or self.force_n == 0.0:
+        if self.force_n == 0.0 or self._data.ncon == 0:
             return 0.0
         along = (self._data.contact.pos - position_world_m) @ axis_world
         return self.force_n if bool(np.any(along > self._bow_from_m)) else 0.0
 
     def underside_force_n(self, position_world_m: Array, up_world: Array, below_m: float) -> float:
         """`force_n` while any contact lies lower in the body than `below_m` (package axes, z up), else 0."""
-        if self._data.ncon == 0 or self.force_n == 0.0:
+        if self.force_n == 0.0 or self._data.ncon == 0:
             return 0.0
         height = (self._data.contact.pos - position_world_m) @ up_world
         return self.force_n if bool(np.any(height < below_m)) else 0.0

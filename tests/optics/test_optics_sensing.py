@@ -16,11 +16,11 @@ from auvdock.optics.detection_model import (
     draw_detections,
     load_detection_model,
     merge_close,
-    squared_distances,
 )
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_preset
 from auvdock.optics.sensing import BeaconSensor
+from auvdock.optics.spots import squared_distances
 from auvdock.optics.water import WaterCfg, load_water, with_attenuation
 
 MODEL = DetectionModelCfg(
@@ -198,3 +198,26 @@ def test_fit_finds_the_threshold_of_a_plain_detector():
 def test_lamp_alone_in_distilled_water_is_seen_far_away():
     unit = sensor(one_lamp(), water=with_attenuation(load_water("I"), 0.02))
     assert len(unit.detect(pose(60.0), 0.0)) == 1
+
+
+@pytest.mark.parametrize("range_m", [1.5, 4.0, 12.0, 25.0])
+def test_lights_meet_as_their_profiles_say(range_m):
+    """The compiled sums over lights and rings against the same in NumPy, 1e-12."""
+    unit = sensor()
+    view = unit.lit.look(pose(range_m), 0.0)
+    model = unit.lit.spots
+    spots = model.spots(view.received, view.inside.nonzero()[0])
+    pixels = view.pixels[view.inside]
+    assert len(pixels) > 0
+    met = model.meet(spots, pixels, 0.01, 3e4)
+    area = model.saturated_area_px2(spots, 3e4 / 0.01)
+    gap2 = np.sum((pixels[:, None] - pixels[None]) ** 2, axis=2)
+    channel = spots.channel * 0.01
+    best = channel.argmax(axis=1)
+    level = model.at_distance(spots, gap2) * channel.T[best]
+    np.testing.assert_array_equal(met.channel, best)
+    np.testing.assert_allclose(met.distance2_px2, gap2, atol=1e-9)
+    np.testing.assert_allclose(met.own_e, np.diag(level), rtol=1e-12)
+    np.testing.assert_allclose(met.around_e, level.sum(axis=1) - np.diag(level), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(met.radius_px, np.sqrt(area.max(axis=1) / np.pi), rtol=1e-12)
+    assert met.share == pytest.approx(model.share(area), rel=1e-12)
