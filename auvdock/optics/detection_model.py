@@ -117,11 +117,12 @@ class DetectionModelCfg:
 
     @cached_property
     def numbers(self) -> Array:
-        """(10,) what compiled code takes: finding (4), measuring (4), finding a rotating beacon (2)."""
+        """(12,) what compiled code takes: finding (4), measuring (4), finding a rotating beacon (2), merging (2)."""
         ways = self.flash or _FLASH
         found = self.contrast_50_dn, self.surround_factor, self.slope, self.ceiling
         measured = self.centre_at_100, self.centre_floor_px, self.score_gain, self.wrong_colour
-        return np.array([*found, *measured, ways.contrast_50_dn, ways.slope])
+        merged = self.merge_px, self.merge_radii
+        return np.array([*found, *measured, ways.contrast_50_dn, ways.slope, *merged])
 
     def __post_init__(self) -> None:
         """Refuse what is no probability or no width."""
@@ -204,9 +205,9 @@ def draw_detections(
     """
     m = len(seen.flux)
     chance, noise = rng.random((2, m)), rng.standard_normal((m, 2))
-    rate = model.false_alarms * veiled_share(seen)
-    alarms = rng.poisson(rate) if rate > 0.0 else 0
-    merged = merge_close(seen, model)
+    veiled, close = _crowded(seen.surround_dn, seen.contrast_dn, seen.distance2_px2, seen.radius_px, model.numbers)
+    alarms = rng.poisson(model.false_alarms * veiled / m) if model.false_alarms * veiled > 0.0 else 0
+    merged = merge_close(seen, model) if close else seen
     contrast = merged.contrast_dn
     flash, ways = seen.flash, model.flash or _FLASH
     index, centre, xyxy, score, class_id = _drawn(
@@ -313,16 +314,25 @@ def _veiled(surround: Array, contrast: Array) -> int:
 
 
 @compiled
-def _close(distance2: Array, radius: Array, merge_px: float, merge_radii: float) -> tuple[bool, BoolArray]:
-    """Whether any two lights are, and which (m, m) are, too close to be told apart."""
+def _close(distance2: Array, radius: Array, model: Array) -> BoolArray:
+    """Which lights (m, m) are too close to be told apart; `model` is `DetectionModelCfg.numbers`."""
     close = np.empty(distance2.shape, dtype=np.bool_)
-    found = False
     for i in range(len(radius)):
         for j in range(len(radius)):
-            limit = merge_px + merge_radii * (radius[i] + radius[j])
+            limit = model[10] + model[11] * (radius[i] + radius[j])
             close[i, j] = distance2[i, j] < limit * limit
-            found = found or (close[i, j] and i != j)
-    return found, close
+    return close
+
+
+@compiled
+def _crowded(surround: Array, contrast: Array, distance2: Array, radius: Array, model: Array) -> tuple[int, bool]:
+    """How many of the lights are veiled, and whether any two are too close to be told apart."""
+    close = _close(distance2, radius, model)
+    for i in range(len(radius)):
+        for j in range(i):
+            if close[i, j]:
+                return _veiled(surround, contrast), True
+    return _veiled(surround, contrast), False
 
 
 def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
@@ -331,11 +341,7 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
     Lights that have been merged into another keep their place with contrast 0.
     """
     m = len(seen.flux)
-    if m < 2:
-        return seen
-    found, close = _close(seen.distance2_px2, seen.radius_px, model.merge_px, model.merge_radii)
-    if not found:
-        return seen
+    close = _close(seen.distance2_px2, seen.radius_px, model.numbers)
     pixels, contrast, flux = seen.pixels.copy(), seen.contrast_dn.copy(), seen.flux.copy()
     radius = seen.radius_px.copy()
     lead = list(range(m))

@@ -23,7 +23,7 @@ from auvdock.sim.mj import MjData, addresses, mujoco
 from auvdock.sim.ocean import CurrentCfg, Ocean
 from auvdock.sim.scene import LATCH, VEHICLE, build_model
 from auvdock.sim.sensors import SensorCfg, Sensors
-from auvdock.sim.stepping import ROW, advance, is_absurd, motion
+from auvdock.sim.stepping import MOTION, ROW, advance, is_absurd, keep, motion
 from auvdock.sim.truth import Truth
 
 __all__ = ["HistoryEntry", "SimCfg", "Simulator"]
@@ -104,9 +104,9 @@ class Simulator:
         water = hydrodynamics.displaced_kg, hydrodynamics.buoyancy_n, self._dt_s
         self._constants = np.array([*water, watch.reach_m, *watch.normal_world, watch.offset_m])
         self._totals: Array = np.zeros(2)
-        self._ring: Array = np.zeros((_HISTORY_STEPS, ROW + len(self.vehicle.actuators)))
+        self._ring: Array = np.zeros((_HISTORY_STEPS + 1, ROW + len(self.vehicle.actuators)))
         self._truth: Truth | None = None
-        self._motion_now: Array | None = None
+        self._moving: Array | None = None
         self._bind()
         self.reset(np.array(self._dock.free_world_m), np.array([0.0, 0.0, 0.0, 1.0]), np.random.default_rng(0))
 
@@ -134,7 +134,7 @@ class Simulator:
     @property
     def data(self) -> MjData:
         """MuJoCo's data, with poses of bodies, geoms, cameras and lights brought up to the present state."""
-        self._motion_now = None  # whoever holds the data may change it
+        self._moving = None  # whoever holds the data may change it
         if self._poses_stale:
             mujoco.mj_kinematics(self.model, self._data)
             mujoco.mj_comPos(self.model, self._data)
@@ -188,6 +188,7 @@ class Simulator:
         self._contacts.reset()
         self._totals[:] = 0.0
         self._absurd: list[HistoryEntry] = []
+        keep(self._ring, 0, self._qpos, self._qvel)
         mujoco.mj_forward(self.model, self._data)
         self._poses_stale = False
         self._observe()
@@ -202,6 +203,7 @@ class Simulator:
         """
         values = self._actuators.checked(command)
         while steps > 0 and not self._diverged:
+            moving = np.empty(MOTION)
             noise = self._ocean.noise(steps)
             made = advance(
                 *self._addresses,
@@ -224,6 +226,7 @@ class Simulator:
                 self._constants,
                 self._totals,
                 self._ring,
+                moving,
             )
             if made < 0:
                 raise ValueError(f"command {-1 - made} is not a number")
@@ -235,7 +238,7 @@ class Simulator:
             self._steps += made
             steps -= made
             self._contacts.update()
-            self._observe()
+            self._observe(moving)
 
     @property
     def time_s(self) -> float:
@@ -291,30 +294,31 @@ class Simulator:
         )
 
     def _motion(self) -> Array:
-        """`stepping.motion` of the present state, read-only; kept for a step."""
-        if self._motion_now is None:
-            self._motion_now = motion(self._qpos, self._qvel, self._ocean.current, self._ocean.gust)
-            self._motion_now.setflags(write=False)
-        return self._motion_now
+        """`stepping.motion` of the present state, read-only."""
+        if self._moving is None:
+            self._moving = np.empty(MOTION)
+            motion(self._qpos, self._qvel, self._ocean.current, self._ocean.gust, self._moving)
+            self._moving.setflags(write=False)
+        return self._moving
 
     @property
     def history(self) -> list[HistoryEntry]:
         """The last 240 steps; once diverged, the absurd state is the last entry."""
         kept = min(self._steps, _HISTORY_STEPS - len(self._absurd))
-        rows = [self._ring[index % _HISTORY_STEPS].tolist() for index in range(self._steps - kept, self._steps)]
+        rows = [self._ring[index % len(self._ring)].tolist() for index in range(self._steps - kept, self._steps)]
         return [HistoryEntry(row[0] * self._dt_s, row[1:8], row[8:ROW], row[ROW:]) for row in rows] + self._absurd
 
-    def _observe(self) -> None:
-        """Dock, latch and divergence after steps or a reset."""
-        self._truth = self._motion_now = None
+    def _observe(self, moving: Array | None = None) -> None:
+        """Dock, latch and divergence after steps or a reset; `moving` is what `motion` says of the state."""
+        qpos: list[float] = self._qpos.tolist()
+        qvel: list[float] = self._qvel.tolist()
         if is_absurd(self._qpos, self._qvel):
-            # The last step that was made started from a sane state.
-            row = self._ring[(self._steps - 1) % _HISTORY_STEPS]
-            self._sane = row[1:8].copy(), row[8:ROW].copy()
             self._freeze([])
             return
-        self._sane = self._qpos.copy(), self._qvel.copy()
-        weld = self._dock.update(self.time_s, self._qpos.tolist(), self._qvel.tolist(), self._contacts)
+        if moving is not None:
+            moving.setflags(write=False)
+        self._truth, self._moving = None, moving
+        weld = self._dock.update(self.time_s, qpos, qvel, self._contacts)
         if weld is not None:
             self._close_latch(weld)
 
@@ -322,8 +326,11 @@ class Simulator:
         """Mark as diverged and go back to the last sane state, so that nobody downstream meets a NaN."""
         self._diverged = True
         self._absurd = [HistoryEntry(self.time_s, self._qpos.tolist(), self._qvel.tolist(), command)]
-        self._truth = self._motion_now = None
-        self._qpos[:], self._qvel[:] = self._sane
+        self._truth = self._moving = None
+        # Either somebody wrote to the data since the last step, or that step went wrong, whose state was not kept.
+        index = self._steps if command else self._steps - 1
+        row = self._ring[index % len(self._ring)]
+        self._qpos[:], self._qvel[:] = row[1:8], row[8:ROW]
         self._contacts.force_n = 0.0
 
     def _close_latch(self, weld: Weld) -> None:

@@ -16,6 +16,7 @@ from auvdock.core.compiled import compiled
 from auvdock.sim.mj import c_function
 
 __all__ = [
+    "MOTION",
     "ROW",
     "add_mass",
     "advance",
@@ -23,6 +24,7 @@ __all__ = [
     "flow",
     "hydraulic_power_w",
     "is_absurd",
+    "keep",
     "motion",
     "respond",
     "wrench",
@@ -30,6 +32,8 @@ __all__ = [
 
 ROW = 14
 """Numbers in a row of the history before the command: index of the step, qpos (7), qvel (6)."""
+MOTION = 34
+"""Numbers that `motion` gives."""
 _MAX_SPEED_M_S = 10.0
 _MAX_RATE_RAD_S = 50.0
 _MAX_DISTANCE_M = 200.0
@@ -59,6 +63,7 @@ def advance(
     constants: Array,
     totals: Array,
     history: Array,
+    moving: Array,
 ) -> int:
     """Make up to `steps` physics steps; fewer if something happens in one of them that has to be looked at.
 
@@ -88,7 +93,9 @@ def advance(
         constants: (8,) displaced mass in kg, buoyancy in N, length of a step in s; the watched point's x in the body
             frame and the half space (3 for its normal, 1 for its offset) in which the dock watches nothing.
         totals: (2,) hydraulic work in J and path length in m, summed up in place.
-        history: (h, 14 + n) ring of the last steps: index of the step, state before it, command.
+        history: (h, 14 + n) ring of the last steps: index of the step, state before it, command; and behind them the
+            state after the last one that ended in a sane state.
+        moving: (34,) takes `motion` after the last step.
 
     Returns:
         Steps made; 0 if the state was absurd to begin with, −1 − i if command i is not a number.
@@ -101,17 +108,15 @@ def advance(
     speeds = np.empty(len(weights) - 12)
     if is_absurd(qpos, qvel):  # somebody wrote to the data
         return 0
-    for step in range(steps):
-        row = history[(done + step) % len(history)]
-        row[0] = done + step
-        row[1:8] = qpos
-        row[8:14] = qvel
-        row[14:] = command
+    made = 0
+    while made < steps:
+        keep(history, done + made, qpos, qvel)
+        history[(done + made) % len(history), ROW:] = command
         respond(state, command, actuators)
         _mj_step1(model, data)
         flow(qpos[2], current, gust, water)
         if len(noise) > 0:
-            blow(current, noise[step], dt_s, gust, acceleration)
+            blow(current, noise[made], dt_s, gust, acceleration)
         wrench(rotation, qvel, water, acceleration, state, actuators, weights, constants, applied, speeds)
         add_mass(mass, rotation, added)
         _mj_factor_mass(model, data)
@@ -119,16 +124,27 @@ def advance(
         _mj_step2(model, data)
         totals[0] += hydraulic_power_w(state, speeds, actuators) * dt_s
         totals[1] += path_m
+        made += 1
         if constraint[0] != 0.0 or constraint[1] != 0.0 or constraint[2] != 0.0 or is_absurd(qpos, qvel):
-            return step + 1
+            break
         reach = constants[3]
         w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
         height = constants[4] * (qpos[0] + reach * (1.0 - 2.0 * (y * y + z * z)))
         height += constants[5] * (qpos[1] + reach * 2.0 * (x * y + w * z))
         height += constants[6] * (qpos[2] + reach * 2.0 * (x * z - w * y))
         if height <= constants[7]:
-            return step + 1
-    return steps
+            break
+    motion(qpos, qvel, current, gust, moving)
+    if not is_absurd(qpos, qvel):
+        keep(history, done + made, qpos, qvel)
+    return made
+
+
+@compiled
+def keep(history: Array, index: int, qpos: Array, qvel: Array) -> None:
+    """Put the state (7,), (6,) before step `index` into the ring (h, 14 + n)."""
+    row = history[index % len(history)]
+    row[0], row[1:8], row[8:ROW] = index, qpos, qvel
 
 
 @compiled
@@ -185,7 +201,7 @@ def blow(current: Array, noise: Array, dt_s: float, gust: Array, acceleration: A
 
 
 @compiled
-def motion(qpos: Array, qvel: Array, current: Array, gust: Array) -> Array:
+def motion(qpos: Array, qvel: Array, current: Array, gust: Array, out: Array) -> None:
     """What follows from the state of a free body in moving water.
 
     Args:
@@ -193,12 +209,10 @@ def motion(qpos: Array, qvel: Array, current: Array, gust: Array) -> Array:
         qvel: (6,) velocity in the world frame, angular velocity in the body frame.
         current: (6,) `Ocean.current`.
         gust: (2,) horizontal, world frame, m/s.
-
-    Returns:
-        (34,) pose of the body in the world (4 × 4), roll, pitch and yaw, velocity of the water in the world frame, ν
-        over ground and ν relative to the water (6 each, body axes), m/s and rad/s.
+        out: (34,) takes the pose of the body in the world (4 × 4), roll, pitch and yaw, velocity of the water in the
+            world frame, ν over ground and ν relative to the water (6 each, body axes), m/s and rad/s.
     """
-    out = np.zeros(34)
+    out[:] = 0.0
     w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
     out[0], out[1], out[2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
     out[4], out[5], out[6] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
@@ -212,7 +226,6 @@ def motion(qpos: Array, qvel: Array, current: Array, gust: Array) -> Array:
             out[22 + i] += qvel[j] * out[4 * j + i]
             out[28 + i] += (qvel[j] - out[19 + j]) * out[4 * j + i]
         out[25 + i] = out[31 + i] = qvel[3 + i]
-    return out
 
 
 @compiled
