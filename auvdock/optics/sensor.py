@@ -107,11 +107,15 @@ def _noise_dn(electrons: Array, numbers: Array) -> Array:
 @compiled
 def _contrast(own: Array, around: Array, numbers: Array) -> tuple[Array, Array, Array]:
     """`SensorScale.contrast`."""
-    bright, surround = _codes(own + around, numbers), _codes(around, numbers)
+    bright = np.empty(len(own))
+    for i in range(len(own)):
+        bright[i] = own[i] + around[i]
+    noise = _noise_dn(bright, numbers)
+    bright, surround = _codes(bright, numbers), _codes(around, numbers)
     for i in range(len(own)):
         surround[i] = min(surround[i], 255.0)
         bright[i] = min(bright[i], 255.0) - surround[i]
-    return bright, surround, _noise_dn(own + around, numbers)
+    return bright, surround, noise
 
 
 class Sensor:

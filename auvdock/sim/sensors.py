@@ -118,7 +118,9 @@ def _readings(
     datum_rad: float,
 ) -> Array:
     """(13,) error of the depth, and what the other sensors say: three each of angles, rates and both velocities."""
-    out = bias + std * noise
+    out = np.empty(13)
+    for i in range(13):
+        out[i] = bias[i] + std[i] * noise[i]
     for i in range(3):
         out[1 + i] += euler_zyx_rad[i]
         out[4 + i] += nu_body[3 + i]

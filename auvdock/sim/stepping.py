@@ -111,7 +111,9 @@ def advance(
     made = 0
     while made < steps:
         keep(history, done + made, qpos, qvel)
-        history[(done + made) % len(history), ROW:] = command
+        row = history[(done + made) % len(history)]
+        for i in range(len(command)):
+            row[ROW + i] = command[i]
         respond(state, command, actuators)
         _mj_step1(model, data)
         flow(qpos[2], current, gust, water)
@@ -144,7 +146,11 @@ def advance(
 def keep(history: Array, index: int, qpos: Array, qvel: Array) -> None:
     """Put the state (7,), (6,) before step `index` into the ring (h, 14 + n)."""
     row = history[index % len(history)]
-    row[0], row[1:8], row[8:ROW] = index, qpos, qvel
+    row[0] = index
+    for i in range(7):
+        row[1 + i] = qpos[i]
+    for i in range(6):
+        row[8 + i] = qvel[i]
 
 
 @compiled
@@ -212,7 +218,8 @@ def motion(qpos: Array, qvel: Array, current: Array, gust: Array, out: Array) ->
         out: (34,) takes the pose of the body in the world (4 × 4), roll, pitch and yaw, velocity of the water in the
             world frame, ν over ground and ν relative to the water (6 each, body axes), m/s and rad/s.
     """
-    out[:] = 0.0
+    for i in range(MOTION):
+        out[i] = 0.0
     w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
     out[0], out[1], out[2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
     out[4], out[5], out[6] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
@@ -220,11 +227,13 @@ def motion(qpos: Array, qvel: Array, current: Array, gust: Array, out: Array) ->
     out[3], out[7], out[11], out[15] = qpos[0], qpos[1], qpos[2], 1.0
     out[16], out[18] = math.atan2(out[9], out[10]), math.atan2(out[4], out[0])
     out[17] = -math.asin(max(-1.0, min(1.0, out[8])))
-    flow(qpos[2], current, gust, out[19:22])
+    water = np.empty(3)
+    flow(qpos[2], current, gust, water)
     for i in range(3):
+        out[19 + i] = water[i]
         for j in range(3):
             out[22 + i] += qvel[j] * out[4 * j + i]
-            out[28 + i] += (qvel[j] - out[19 + j]) * out[4 * j + i]
+            out[28 + i] += (qvel[j] - water[j]) * out[4 * j + i]
         out[25 + i] = out[31 + i] = qvel[3 + i]
 
 
@@ -278,10 +287,13 @@ def add_mass(rows: Array, rotation: Array, added: Array) -> None:
         rotation: (3, 3) R, body to world.
         added: (6, 6) M_A.
     """
-    half, whole = added.copy(), added.copy()
+    half, whole = np.empty((6, 6)), np.empty((6, 6))
     for i in range(3):
         for j in range(6):
             half[i, j] = rotation[i, 0] * added[0, j] + rotation[i, 1] * added[1, j] + rotation[i, 2] * added[2, j]
+    for i in range(3, 6):
+        for j in range(6):
+            half[i, j] = added[i, j]
     for i in range(6):
         a, b, c = half[i, 0], half[i, 1], half[i, 2]
         for j in range(3):
@@ -356,4 +368,5 @@ def wrench(
     force[3] = out[3] + py * w - pz * v + hy * r - hz * q
     force[4] = out[4] + pz * u - px * w + hz * p - hx * r
     force[5] = out[5] + px * v - py * u + hx * q - hy * p
-    speeds[:] = out[12:]
+    for k in range(len(speeds)):
+        speeds[k] = out[12 + k]
