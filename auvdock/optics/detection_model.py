@@ -18,19 +18,21 @@ from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
+from auvdock.optics.light_loop import close, crowded, veiled
 
 __all__ = [
     "Candidates",
     "DetectionModelCfg",
     "Flash",
     "FlashModelCfg",
+    "draw_among",
     "draw_detections",
     "load_detection_model",
     "merge_close",
     "veiled_share",
 ]
 
-_VEILED_DN, _LEAST_DN = 50.0, 1e-3
+_LEAST_DN = 1e-3
 _HAZE_PX = 20.0
 _GHOST_FLUX = 0.3
 """Flux of haze that breaks into spots, over that of the dimmest light (ours)."""
@@ -203,11 +205,23 @@ def draw_detections(
         size_px: width and height of the image.
         rng: source of the draws.
     """
-    m = len(seen.flux)
+    counts = crowded(seen.surround_dn, seen.contrast_dn, seen.distance2_px2, seen.radius_px, model.numbers)
+    return draw_among(seen, counts, model, size_px, rng)
+
+
+def draw_among(
+    seen: Candidates,
+    counts: tuple[float, bool],
+    model: DetectionModelCfg,
+    size_px: tuple[int, int],
+    rng: np.random.Generator,
+) -> Detections:
+    """As `draw_detections`, where it is known how many lights are veiled and whether any two are too close."""
+    (hidden, near), m = counts, len(seen.flux)
     chance, noise = rng.random((2, m)), rng.standard_normal((m, 2))
-    veiled, close = _crowded(seen.surround_dn, seen.contrast_dn, seen.distance2_px2, seen.radius_px, model.numbers)
-    alarms = rng.poisson(model.false_alarms * veiled / m) if model.false_alarms * veiled > 0.0 else 0
-    merged = merge_close(seen, model) if close else seen
+    rate = model.false_alarms * hidden / max(m, 1)
+    alarms = rng.poisson(rate) if rate > 0.0 else 0
+    merged = merge_close(seen, model) if near else seen
     contrast = merged.contrast_dn
     flash, ways = seen.flash, model.flash or _FLASH
     index, centre, xyxy, score, class_id = _drawn(
@@ -300,39 +314,7 @@ def _drawn(
 
 def veiled_share(seen: Candidates) -> float:
     """Share of lights whose surroundings outshine their contrast by 50 codes or more."""
-    return _veiled(seen.surround_dn, seen.contrast_dn) / max(len(seen.flux), 1)
-
-
-@compiled
-def _veiled(surround: Array, contrast: Array) -> int:
-    """How many of the lights (m,) are."""
-    count = 0
-    for i in range(len(contrast)):
-        if surround[i] > contrast[i] + _VEILED_DN:
-            count += 1
-    return count
-
-
-@compiled
-def _close(distance2: Array, radius: Array, model: Array) -> BoolArray:
-    """Which lights (m, m) are too close to be told apart; `model` is `DetectionModelCfg.numbers`."""
-    close = np.empty(distance2.shape, dtype=np.bool_)
-    for i in range(len(radius)):
-        for j in range(len(radius)):
-            limit = model[10] + model[11] * (radius[i] + radius[j])
-            close[i, j] = distance2[i, j] < limit * limit
-    return close
-
-
-@compiled
-def _crowded(surround: Array, contrast: Array, distance2: Array, radius: Array, model: Array) -> tuple[int, bool]:
-    """How many of the lights are veiled, and whether any two are too close to be told apart."""
-    close = _close(distance2, radius, model)
-    for i in range(len(radius)):
-        for j in range(i):
-            if close[i, j]:
-                return _veiled(surround, contrast), True
-    return _veiled(surround, contrast), False
+    return veiled(seen.surround_dn, seen.contrast_dn) / max(len(seen.flux), 1)
 
 
 def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
@@ -341,13 +323,13 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
     Lights that have been merged into another keep their place with contrast 0.
     """
     m = len(seen.flux)
-    close = _close(seen.distance2_px2, seen.radius_px, model.numbers)
+    too_near = close(seen.distance2_px2, seen.radius_px, model.numbers)
     pixels, contrast, flux = seen.pixels.copy(), seen.contrast_dn.copy(), seen.flux.copy()
     radius = seen.radius_px.copy()
     lead = list(range(m))
     for i in range(m):
         for j in range(i + 1, m):
-            if close[i, j] and contrast[i] > 0.0 and contrast[j] > 0.0:
+            if too_near[i, j] and contrast[i] > 0.0 and contrast[j] > 0.0:
                 a, b = _root(lead, i), _root(lead, j)
                 if a != b:
                     lead[max(a, b)] = min(a, b)

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.optics.light_loop import rows_of
 
 __all__ = ["HaloTable", "halo_table", "wells_transfer"]
 
@@ -39,14 +39,16 @@ class HaloTable:
     """Halo of unit light (without absorption) over b r and angle, for one θ0.
 
     The whole halo holds 1 - e^{-b r}. Beyond b r = 40 the table is held constant in shape.
+
+    Attributes:
+        places: (4,) where in the table which b r is, for `light_loop.rows_of`.
     """
 
     def __init__(self, theta0_rad: float) -> None:
         """Scale the universal table to an angle."""
         self.theta0_rad = theta0_rad
         log_br, self._log_t, self._log_density, self._encircled = _universal()
-        self._first = float(log_br[0])
-        self._per_step = 1.0 / float(log_br[1] - log_br[0])
+        self.places = np.array([log_br[0], 1.0 / (log_br[1] - log_br[0]), _MIN_BR, 0.999 * _MAX_BR])
 
     def density_rows(self, angle_rad: Array) -> Array:
         """(rows, m) halo per steradian at fixed angles (m,), one row per tabulated b r; see `row_of`."""
@@ -61,7 +63,7 @@ class HaloTable:
 
     def row_of(self, br: Array) -> tuple[IntArray, Array]:
         """Row (n,) below each b r (n,) and the weight (n,) of the row above: linear in log b r."""
-        return _rows_of(br, self._first, self._per_step)
+        return rows_of(br, self.places)
 
     def density(self, br: float, angle_rad: Array) -> Array:
         """(m,) halo per steradian at angles (m,) for one b r."""
@@ -76,17 +78,6 @@ class HaloTable:
         blend = rows[row[0]] * (1.0 - weight[0]) + rows[row[0] + 1] * weight[0]
         # Rows hold the halo per scattered energy, which itself is known exactly.
         return blend * -math.expm1(-br)
-
-
-@compiled
-def _rows_of(br: Array, first: float, per_step: float) -> tuple[IntArray, Array]:
-    """`HaloTable.row_of`."""
-    row, weight = np.empty(len(br), dtype=np.int64), np.empty(len(br))
-    for i in range(len(br)):
-        place = (math.log(min(max(br[i], _MIN_BR), 0.999 * _MAX_BR)) - first) * per_step
-        row[i] = int(place)
-        weight[i] = place - row[i]
-    return row, weight
 
 
 @lru_cache(maxsize=16)

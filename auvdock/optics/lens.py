@@ -9,7 +9,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.camera import Camera
-from auvdock.core.compiled import compiled
+from auvdock.optics.light_loop import located
 from auvdock.optics.settings import ImagingCfg
 
 __all__ = ["Lens"]
@@ -25,6 +25,8 @@ class Lens:
         shape: (rows, columns) of the coarse grid.
         aperture_m2: area of the entrance pupil times the lens' transmission.
         rad_per_px: angle of a pixel in the middle of the image.
+        numbers: (12,) of a lens without tangential distortion, for `light_loop.located`: the greatest squared tangent,
+            offset from the image's middle (2), k1, k2, k3, focal lengths (2), principal point (2) and middle (2) in px.
         max_tangent: tangent of the angle between the optical axis and the farthest corner of the image.
     """
 
@@ -47,7 +49,7 @@ class Lens:
         corner = camera.normalise(np.array([[-0.5, -0.5], [last_x, last_y], [last_x, -0.5], [-0.5, last_y]]))
         self._max_tangent2 = float(np.max(np.sum(corner**2, axis=1)))
         self.max_tangent = math.sqrt(self._max_tangent2)
-        self._edges = self._edges_at(0.0)
+        self.numbers = self._numbers_at(0.0)
 
     @cached_property
     def rays(self) -> Array:
@@ -97,15 +99,26 @@ class Lens:
         Rays beyond the image's corners (by more than the margin) have no meaningful pixel: the distortion polynomial
         folds back there.
         """
-        limit, reach = self._edges if margin_px == 0.0 else self._edges_at(margin_px)
         if self._radial is not None:
-            return _located(rays, limit, reach, self._radial, self._focal, self._centre, self._middle)
+            return located(rays, self.numbers if margin_px == 0.0 else self._numbers_at(margin_px))
+        limit, reach = self._edges_at(margin_px)
         ahead = rays[:, 2] > 0.0
         xy = rays[:, :2] / np.where(ahead, rays[:, 2], 1.0)[:, None]
         inside = ahead & (np.sum(xy * xy, axis=1) <= limit)
         pixels = self.camera.project(np.where(inside[:, None], rays, _AHEAD))
         inside &= np.all(np.abs(pixels - self._middle) < reach, axis=1)
         return pixels, inside
+
+    @property
+    def is_radial(self) -> bool:
+        """Whether `numbers` tell all about the lens."""
+        return self._radial is not None
+
+    def _numbers_at(self, margin_px: float) -> Array:
+        """`numbers` with a margin about the image."""
+        limit, reach = self._edges_at(margin_px)
+        radial = self._radial or (0.0, 0.0, 0.0)
+        return np.array([limit, *reach, *radial, *self._focal, *self._centre, *self._middle])
 
     def _edges_at(self, margin_px: float) -> tuple[float, Array]:
         """Greatest squared tangent to the optical axis and offset from the image's middle (2,), with a margin."""
@@ -114,31 +127,6 @@ class Lens:
 
 
 _AHEAD = np.array([0.0, 0.0, 1.0])
-
-
-@compiled
-def _located(
-    rays: Array,
-    limit: float,
-    reach: Array,
-    radial: tuple[float, float, float],
-    focal: Array,
-    centre: Array,
-    middle: Array,
-) -> tuple[Array, BoolArray]:
-    """`Lens.locate` without tangential distortion: `Camera.project` at a fraction of its cost for a few points."""
-    pixels, inside = np.empty((len(rays), 2)), np.empty(len(rays), dtype=np.bool_)
-    k1, k2, k3 = radial
-    for i in range(len(rays)):
-        depth = max(rays[i, 2], 1e-9)
-        x, y = rays[i, 0] / depth, rays[i, 1] / depth
-        r2 = x * x + y * y
-        seen = r2 <= limit and rays[i, 2] > 0.0
-        r2 = min(r2, limit)
-        stretch = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        pixels[i, 0], pixels[i, 1] = focal[0] * stretch * x + centre[0], focal[1] * stretch * y + centre[1]
-        inside[i] = seen and abs(pixels[i, 0] - middle[0]) < reach[0] and abs(pixels[i, 1] - middle[1]) < reach[1]
-    return pixels, inside
 
 
 def _coarse_factor(width_px: int) -> int:

@@ -13,14 +13,12 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconCfg, BeaconLayout
-from auvdock.core.compiled import compiled
 from auvdock.optics.bands import electrons_per_joule
 from auvdock.optics.light import peak_intensity_w_sr
+from auvdock.optics.light_loop import received
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["LightSet", "Received"]
-
-_NEAREST_M2 = 1e-4
 
 
 class Received(NamedTuple):
@@ -85,54 +83,12 @@ class LightSet:
         recessed = np.flatnonzero(((setback > 0.05) & inside & funnel)[: self.station_count])
         # Of each lamp inside the funnel its index, how far it is set back and where it lies from the rim's centre.
         places = self.positions_m[recessed, 1:] - rim_centre
-        self._behind = np.column_stack([recessed.astype(np.float64), setback[recessed], places])
-        self._rim = np.array([rim_x, *rim_centre, rim_radius2])
+        self.behind = np.column_stack([recessed.astype(np.float64), setback[recessed], places])
+        self.rim = np.array([rim_x, *rim_centre, rim_radius2])
         lamps_of = minus_profile, self.absorption_per_m, self.scattering_per_m, self.peak_w_sr
-        self._lamps = np.column_stack([self.positions_m, self.axes, *lamps_of])
+        self.lamps = np.column_stack([self.positions_m, self.axes, *lamps_of])
 
     def received(self, T_station_camera: Array) -> Received:
         """Core and halo irradiance of every lamp at a camera pose (4, 4)."""
-        ray, parts = _received(T_station_camera, self._lamps, self._behind, self._rim)
+        ray, parts = received(T_station_camera, self.lamps, self.behind, self.rim)
         return Received(ray, parts[0], parts[1], parts[2], parts[3])
-
-
-@compiled
-def _received(T_station_camera: Array, lamps: Array, behind: Array, rim: Array) -> tuple[Array, Array]:
-    """Rays in the camera frame (n, 3), and range, scattering depth, core and halo (4, n).
-
-    Args:
-        T_station_camera: (4, 4).
-        lamps: (n, 10) position, axis, factor of θ² in the beam's exponent, absorption, scattering, peak intensity.
-        behind: (k, 4) lamps inside the funnel: index, setback, y and z from the rim's centre.
-        rim: (4,) x of its plane, y and z of its centre, square of its radius.
-    """
-    count = len(lamps)
-    ray, offset = np.empty((count, 3)), np.empty(3)
-    parts, total = np.empty((4, count)), np.empty(count)
-    for i in range(count):
-        r2 = along = 0.0
-        for k in range(3):
-            offset[k] = lamps[i, k] - T_station_camera[k, 3]
-            r2 += offset[k] * offset[k]
-            along -= offset[k] * lamps[i, 3 + k]
-        r2 = max(r2, _NEAREST_M2)
-        r = math.sqrt(r2)
-        angle = math.acos(min(max(along / r, -1.0), 1.0))
-        total[i] = lamps[i, 9] * math.exp(lamps[i, 6] * angle * angle - lamps[i, 7] * r) / r2
-        parts[0, i], parts[1, i] = r, lamps[i, 8] * r
-        for k in range(3):
-            ray[i, k] = 0.0
-            for axis in range(3):
-                ray[i, k] += offset[axis] / r * T_station_camera[axis, k]
-    ahead = T_station_camera[0, 3] - rim[0]
-    if ahead > 0.0:
-        to_y, to_z = T_station_camera[1, 3] - rim[1], T_station_camera[2, 3] - rim[2]
-        for k in range(len(behind)):
-            share = behind[k, 1] / (behind[k, 1] + ahead)
-            across, up = behind[k, 2] * (1.0 - share) + to_y * share, behind[k, 3] * (1.0 - share) + to_z * share
-            if across * across + up * up > rim[3]:
-                total[int(behind[k, 0])] = 0.0
-    for i in range(count):
-        parts[2, i] = total[i] * math.exp(-parts[1, i])
-        parts[3, i] = total[i] - parts[2, i]
-    return ray, parts

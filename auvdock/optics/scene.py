@@ -104,6 +104,9 @@ class LitScene:
         self._fluctuates = nuisance.flicker != "none" or nuisance.marine_snow != "none"
         self._mirrors = nuisance.surface_reflection != "none"
         self.sensor_rng, self._streams = nuisance_streams(np.random.default_rng(0))
+        quiet = not (self._fluctuates or self._mirrors) and nuisance.daylight == "none"
+        self.is_plain = quiet and rotating is None and not len(self.dead) and self.lens.is_radial
+        """Whether a frame shows nothing but lamps through water and a radial lens, so that `light_loop.see` will do."""
         self._set_lights(())
         self.reset(np.random.default_rng(0))
 
@@ -178,6 +181,10 @@ class LitScene:
             day = float(self.daylight_w_m2(-T_world_camera[2, 3])[0])
             flakes = self.snow.flakes(T_world_camera, received, day)
         return View(T_world_camera, received, pixels, inside, flakes, beam)
+
+    def station_camera(self, T_world_body: Array) -> Array:
+        """(4, 4) pose of the camera in the station frame, for a pose of the vehicle."""
+        return self._T_station_world.dot(T_world_body.dot(self.camera.T_body_camera))
 
     def flake_channel(self, view: View) -> Array:
         """(3,) electrons per second for 1 W/m² of light from flakes: the mean colour of what lights them."""

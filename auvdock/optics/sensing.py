@@ -15,17 +15,19 @@ from auvdock.optics.detection_model import (
     Candidates,
     DetectionModelCfg,
     FlashModelCfg,
+    draw_among,
     draw_detections,
     load_detection_model,
 )
 from auvdock.optics.exposure import AutoExposure, frames_of_a_turn
 from auvdock.optics.flash import FlashOptics, with_flash
+from auvdock.optics.light_loop import see, squared_distances
 from auvdock.optics.metering import predicted_share, veil_share
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.scene import LitScene, View
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
-from auvdock.optics.spots import Spots, squared_distances
+from auvdock.optics.spots import Spots
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeaconSensor", "candidates_in_view"]
@@ -81,6 +83,8 @@ class BeaconSensor:
     def detect(self, T_world_body: Array, time_s: float, station_time_s: float | None = None) -> Detections:
         """Detections of a frame from a body pose (4, 4); times as in `UnderwaterCamera.capture`."""
         exposure = self.exposure
+        if exposure.settled and exposure.metered == 1.0 and self.lit.is_plain:
+            return self._detect_plain(T_world_body)
         view = self.lit.look(T_world_body, time_s, station_time_s, exposure.exposure_s)
         spots = self._flash.spots(view)
         if not exposure.settled:
@@ -90,6 +94,31 @@ class BeaconSensor:
             share = predicted_share(self.lit, view, spots, exposure.metered)(exposure.sensitivity_s)
         exposure.update(share)
         return draw_detections(seen, self.model, self._size, self._rng)
+
+    def _detect_plain(self, T_world_body: Array) -> Detections:
+        """`detect` where nothing but lamps, water and lens plays a part: the same in one compiled call."""
+        lit, exposure = self.lit, self.exposure
+        lights, spots, exposure_s = lit.lights, lit.spots, exposure.exposure_s
+        scale = lit.scale(exposure.gain)
+        pixels, table, red, distance2, (area, hidden, near) = see(
+            lit.station_camera(T_world_body),
+            lights.lamps,
+            lights.behind,
+            lights.rim,
+            lit.lens.numbers,
+            *spots.spreading,
+            spots.ring_px2,
+            spots.spacing,
+            spots.channel,
+            scale.numbers,
+            exposure_s,
+            scale.saturated_e,
+            self.model.numbers,
+        )
+        exposure.update(area / spots.samples)
+        contrast, surround, noise, radius, width, flux = table
+        seen = Candidates(pixels, contrast, surround, noise, radius, width, flux, distance2, red)
+        return draw_among(seen, (hidden, near > 0.0), self.model, self._size, self._rng)
 
 
 def candidates_in_view(

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array, Image
 from auvdock.core.compiled import compiled
 from auvdock.core.response import SATURATED_CODE
+from auvdock.optics.light_loop import codes, contrast, noise_dn
 from auvdock.optics.settings import ImagingCfg
 
 __all__ = ["SATURATED_CODE", "Sensor", "SensorScale", "saturated_share"]
@@ -30,7 +31,16 @@ _SPARE_PX = 64
 
 
 class SensorScale:
-    """The code's scale at one exposure: electrons ↔ DN, without noise."""
+    """The code's scale at one exposure: electrons ↔ DN, without noise.
+
+    Attributes:
+        read_e: read noise in electrons.
+        full_scale_e: electrons of the greatest code.
+        dn_per_root: codes per √electron.
+        saturated_e: electrons at which a sample counts as saturated.
+        numbers: (5,) for `light_loop.codes`: codes per electron of the linear encoding, else 0; read noise squared,
+            read noise, codes per √electron; standard deviation of a code of the other encoding.
+    """
 
     def __init__(self, cfg: ImagingCfg, gain: float) -> None:
         """Precompute the constants."""
@@ -39,17 +49,17 @@ class SensorScale:
         self.read_e = cfg.read_noise_e
         self.full_scale_e = cfg.full_well_e / gain
         self.dn_per_root = 255.0 / (math.sqrt(self.full_scale_e + self._read2) - cfg.read_noise_e)
-        self._noise_dn = math.sqrt(0.25 * self.dn_per_root**2 + 1.0 / 12.0)
         if self._linear:
             self.saturated_e = SATURATED_CODE * self.full_scale_e / 255.0
         else:
             self.saturated_e = (SATURATED_CODE / self.dn_per_root + self.read_e) ** 2 - self._read2
         linear = 255.0 / self.full_scale_e if self._linear else 0.0
-        self._numbers = np.array([linear, self._read2, self.read_e, self.dn_per_root, self._noise_dn])
+        noise_dn = math.sqrt(0.25 * self.dn_per_root**2 + 1.0 / 12.0)
+        self.numbers = np.array([linear, self._read2, self.read_e, self.dn_per_root, noise_dn])
 
     def codes(self, electrons: Array) -> Array:
         """Unrounded, unclipped codes of electrons, any shape."""
-        return _codes(electrons.ravel(), self._numbers).reshape(electrons.shape)
+        return codes(electrons.ravel(), self.numbers).reshape(electrons.shape)
 
     def contrast(self, own_e: Array, around_e: Array) -> tuple[Array, Array, Array]:
         """Lights (m,) over their surroundings, in codes clipped at 255.
@@ -62,7 +72,7 @@ class SensorScale:
             (m,) code of the centre above that of the surroundings, the latter, and the standard deviation of the
             former, quantisation included.
         """
-        return _contrast(own_e, around_e, self._numbers)
+        return contrast(own_e, around_e, self.numbers)
 
     def electrons(self, codes: Array) -> Array:
         """Electrons of codes, any shape; inverse of `codes`."""
@@ -78,44 +88,7 @@ class SensorScale:
 
     def noise_dn(self, electrons: Array) -> Array:
         """Standard deviation of the code at a signal in electrons, quantisation included."""
-        return _noise_dn(electrons.ravel(), self._numbers).reshape(electrons.shape)
-
-
-@compiled
-def _codes(electrons: Array, numbers: Array) -> Array:
-    """`SensorScale.codes`, (n,)."""
-    codes = np.empty(len(electrons))
-    for i in range(len(electrons)):
-        if numbers[0] > 0.0:
-            codes[i] = electrons[i] * numbers[0]
-        else:
-            codes[i] = (math.sqrt(electrons[i] + numbers[1]) - numbers[2]) * numbers[3]
-    return codes
-
-
-@compiled
-def _noise_dn(electrons: Array, numbers: Array) -> Array:
-    """`SensorScale.noise_dn`, (n,)."""
-    noise = np.empty(len(electrons))
-    for i in range(len(electrons)):
-        noise[i] = numbers[4]
-        if numbers[0] > 0.0:
-            noise[i] = math.sqrt((electrons[i] + numbers[1]) * numbers[0] ** 2 + 1.0 / 12.0)
-    return noise
-
-
-@compiled
-def _contrast(own: Array, around: Array, numbers: Array) -> tuple[Array, Array, Array]:
-    """`SensorScale.contrast`."""
-    bright = np.empty(len(own))
-    for i in range(len(own)):
-        bright[i] = own[i] + around[i]
-    noise = _noise_dn(bright, numbers)
-    bright, surround = _codes(bright, numbers), _codes(around, numbers)
-    for i in range(len(own)):
-        surround[i] = min(surround[i], 255.0)
-        bright[i] = min(bright[i], 255.0) - surround[i]
-    return bright, surround, noise
+        return noise_dn(electrons.ravel(), self.numbers).reshape(electrons.shape)
 
 
 class Sensor:

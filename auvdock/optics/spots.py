@@ -8,18 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.core.compiled import compiled
 from auvdock.optics.halo import halo_table
 from auvdock.optics.lens import Lens
+from auvdock.optics.light_loop import areas, at_distance, met, spread
 from auvdock.optics.radiometry import LightSet, Received
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.water import WaterCfg
 
-__all__ = ["FlashLines", "Meeting", "SpotModel", "Spots", "squared_distances"]
+__all__ = ["FlashLines", "Meeting", "SpotModel", "Spots"]
 
 _RADII = 32
-_LEAST_EXPONENT = -60.0
-"""Of a Gaussian; what is left there is below the rounding of any halo."""
 
 
 class FlashLines(NamedTuple):
@@ -63,6 +61,14 @@ class SpotModel:
 
     The core is a Gaussian: the lens' point spread function widened by the lamp's face, σ² = σ_lens² + (R / (2 r) f)²
     (a uniform disc of radius R has variance R²/4 per axis).
+
+    Attributes:
+        radii_px: (k,) radii at which profiles are tabulated.
+        ring_px2: (k,) area of the ring that each stands for.
+        spacing: (2,) where among them a distance is, for `light_loop.at_distance`.
+        spreading: what `light_loop.spread` takes of halo and lens.
+        channel: (n, 3) electrons per second for 1 W/m² of each light on a pixel: red, green, blue.
+        samples: number of the image's samples, three per pixel.
     """
 
     def __init__(self, lens: Lens, lights: LightSet, water: WaterCfg, cfg: ImagingCfg) -> None:
@@ -70,15 +76,14 @@ class SpotModel:
         self.radii_px = np.geomspace(0.35, 0.45 * lens.camera.width_px, _RADII)
         edges = np.concatenate([[0.0], np.sqrt(self.radii_px[1:] * self.radii_px[:-1]), self.radii_px[-1:]])
         self.ring_px2 = math.pi * np.diff(edges**2)
-        self._minus_half_r2 = -0.5 * self.radii_px**2
-        self._spacing = np.array([self.radii_px[0] ** 2, 0.5 / math.log(self.radii_px[1] / self.radii_px[0])])
+        self.spacing = np.array([self.radii_px[0] ** 2, 0.5 / math.log(self.radii_px[1] / self.radii_px[0])])
         table = halo_table(water.scattering_angle_rad)
-        self._table = table
-        self._rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
+        rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
         # Of the core: variance by the lens, and by the lamp's face at 1 m.
         self._widths = np.array([cfg.lens_sigma_px**2, (cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2])
-        self._channel = lights.electrons_per_j * lens.aperture_m2
-        self._samples = lens.camera.width_px * lens.camera.height_px * 3
+        self.spreading = rows, table.places, -0.5 * self.radii_px**2, self._widths
+        self.channel = lights.electrons_per_j * lens.aperture_m2
+        self.samples = lens.camera.width_px * lens.camera.height_px * 3
 
     def sigma_px(self, range_m: Array) -> Array:
         """(n,) standard deviation of the core on the sensor."""
@@ -86,35 +91,31 @@ class SpotModel:
 
     def spots(self, received: Received, index: IntArray) -> Spots:
         """Profiles of the lights `index` (m,)."""
-        row, weight = self._table.row_of(received.scattering_depth[index])
-        core, halo, sigma, profile, channel = _profiles(
+        core, halo, sigma, profile, channel = spread(
             index,
+            received.range_m,
+            received.scattering_depth,
             received.core_w_m2,
             received.halo_w_m2,
-            received.range_m,
-            row,
-            weight,
-            self._rows,
-            self._minus_half_r2,
-            self._widths,
-            self._channel,
+            *self.spreading,
+            self.channel,
         )
         return Spots(core, halo, sigma, profile, channel)
 
     def saturated_area_px2(self, spots: Spots, level_e_s: float) -> Array:
         """(m, 3) area of each spot above a level in electrons per second, per channel; overlap is not counted."""
-        return _areas(spots.profile, spots.channel, 2.5 / level_e_s, self.ring_px2)
+        return areas(spots.profile, spots.channel, level_e_s, self.ring_px2)
 
     def share(self, area_px2: Array) -> float:
         """Share of the image's samples that areas (m, 3) are."""
-        return float(np.add.reduce(area_px2, axis=None)) / self._samples
+        return float(np.add.reduce(area_px2, axis=None)) / self.samples
 
     def at_distance(self, spots: Spots, distance2_px2: Array) -> Array:
         """(m, m) irradiance per pixel at squared distances (m, m) from the lights along the second axis.
 
         Taken at the nearest tabulated radius; the radii are 22 % apart.
         """
-        return _at_distance(spots.profile, distance2_px2, self._spacing)
+        return at_distance(spots.profile, distance2_px2, self.spacing)
 
     def meet(self, spots: Spots, pixels: Array, exposure_s: float, saturated_e: float) -> Meeting:
         """The lights at pixels (m, 2) among each other: at each one's centre its own light and that of the others.
@@ -125,16 +126,10 @@ class SpotModel:
             exposure_s: exposure time.
             saturated_e: electrons at which a sample is saturated.
         """
-        place, own, around, radius, area, distance2 = _met(
-            spots.profile,
-            spots.channel,
-            pixels,
-            self.ring_px2,
-            self._spacing,
-            exposure_s,
-            2.5 * exposure_s / saturated_e,
+        place, own, around, radius, area, distance2 = met(
+            spots.profile, spots.channel, pixels, self.ring_px2, self.spacing, exposure_s, saturated_e
         )
-        return Meeting(place, own, around, radius, area / self._samples, distance2)
+        return Meeting(place, own, around, radius, area / self.samples, distance2)
 
 
 class Meeting(NamedTuple):
@@ -155,102 +150,3 @@ class Meeting(NamedTuple):
     radius_px: Array
     share: float
     distance2_px2: Array
-
-
-@compiled
-def _profiles(
-    index: IntArray,
-    core: Array,
-    halo: Array,
-    range_m: Array,
-    row: IntArray,
-    weight: Array,
-    rows: Array,
-    minus_half_r2: Array,
-    widths: Array,
-    channel: Array,
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Core, halo and widths (m,), profiles (m, k) and channels (m, 3) of the lights `index` (m,) of n."""
-    count = len(index)
-    cores, halos, sigma, channels = np.empty(count), np.empty(count), np.empty(count), np.empty((count, 3))
-    profile = np.empty((count, len(minus_half_r2)))
-    for i in range(count):
-        light = index[i]
-        cores[i], halos[i] = core[light], halo[light]
-        for c in range(3):
-            channels[i, c] = channel[light, c]
-        sigma2 = widths[0] + widths[1] / (range_m[light] * range_m[light])
-        sigma[i] = math.sqrt(sigma2)
-        peak = core[light] / (2.0 * math.pi * sigma2)
-        below, above = rows[row[i]], rows[row[i] + 1]
-        for k in range(len(minus_half_r2)):
-            profile[i, k] = (below[k] + weight[i] * (above[k] - below[k])) * halo[light]
-            exponent = minus_half_r2[k] / sigma2
-            if exponent > _LEAST_EXPONENT:
-                profile[i, k] += peak * math.exp(exponent)
-    return cores, halos, sigma, profile, channels
-
-
-@compiled
-def _areas(profile: Array, channel: Array, scale: float, ring_px2: Array) -> Array:
-    """`SpotModel.saturated_area_px2`: of each ring the part between 0 and 1 by which it is above the level."""
-    area = np.zeros((len(profile), 3))
-    for i in range(len(profile)):
-        for c in range(3):
-            per_w = channel[i, c] * scale
-            for k in range(len(ring_px2)):
-                area[i, c] += min(max(profile[i, k] * per_w - 2.0, 0.0), 1.0) * ring_px2[k]
-    return area
-
-
-@compiled
-def _at_distance(profile: Array, distance2_px2: Array, spacing: Array) -> Array:
-    """`SpotModel.at_distance`."""
-    value = np.empty((len(distance2_px2), len(profile)))
-    first2, per_log2 = spacing[0], spacing[1]
-    last = profile.shape[1] - 1
-    for i in range(len(distance2_px2)):
-        for j in range(len(profile)):
-            place = math.log(max(distance2_px2[i, j], first2) / first2) * per_log2
-            value[i, j] = profile[j, min(int(place + 0.5), last)]
-    return value
-
-
-@compiled
-def squared_distances(pixels: Array) -> Array:
-    """(m, m) squared distances between points (m, 2)."""
-    distance2 = np.empty((len(pixels), len(pixels)))
-    for i in range(len(pixels)):
-        for j in range(len(pixels)):
-            x, y = pixels[i, 0] - pixels[j, 0], pixels[i, 1] - pixels[j, 1]
-            distance2[i, j] = x * x + y * y
-    return distance2
-
-
-@compiled
-def _met(
-    profile: Array, channel: Array, pixels: Array, ring_px2: Array, spacing: Array, exposure_s: float, scale: float
-) -> tuple[IntArray, Array, Array, Array, float, Array]:
-    """`SpotModel.meet`, with the total saturated area in px² in place of the share."""
-    count = len(profile)
-    place, own, around = np.empty(count, dtype=np.int64), np.empty(count), np.empty(count)
-    radius, distance2 = np.empty(count), squared_distances(pixels)
-    areas, level = _areas(profile, channel, scale, ring_px2), _at_distance(profile, distance2, spacing)
-    total = 0.0
-    for i in range(count):
-        best = 0
-        for c in range(1, 3):
-            if channel[i, c] * exposure_s > channel[i, best] * exposure_s:
-                best = c
-        place[i] = best
-        around[i] = 0.0
-        for j in range(count):
-            around[i] += level[i, j] * (channel[j, best] * exposure_s)
-        own[i] = level[i, i] * (channel[i, best] * exposure_s)
-        around[i] -= own[i]
-        greatest = 0.0
-        for c in range(3):
-            total += areas[i, c]
-            greatest = max(greatest, areas[i, c])
-        radius[i] = math.sqrt(greatest / math.pi)
-    return place, own, around, radius, total, distance2

@@ -18,9 +18,9 @@ from auvdock.optics.detection_model import (
     merge_close,
 )
 from auvdock.optics.imaging import ImagingCfg
+from auvdock.optics.light_loop import squared_distances
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_preset
 from auvdock.optics.sensing import BeaconSensor
-from auvdock.optics.spots import squared_distances
 from auvdock.optics.water import WaterCfg, load_water, with_attenuation
 
 MODEL = DetectionModelCfg(
@@ -221,3 +221,32 @@ def test_lights_meet_as_their_profiles_say(range_m):
     np.testing.assert_allclose(met.around_e, level.sum(axis=1) - np.diag(level), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(met.radius_px, np.sqrt(area.max(axis=1) / np.pi), rtol=1e-12)
     assert met.share == pytest.approx(model.share(area), rel=1e-12)
+
+
+@pytest.mark.parametrize("encoding", ["sqrt", "linear"])
+def test_one_call_sees_what_the_single_steps_see(encoding):
+    """An approach of 60 frames without nuisances, in one compiled call a frame and step by step: the same bits."""
+    at_once, by_steps = (
+        BeaconSensor(
+            camera(),
+            CLEAR,
+            station_layout(),
+            NuisanceCfg(),
+            ImagingCfg(encoding=encoding),
+            T_WORLD_STATION,
+            "threshold",
+        )
+        for _ in range(2)
+    )
+    assert at_once.lit.is_plain
+    by_steps.lit.is_plain = False
+    for unit in (at_once, by_steps):
+        unit.reset(np.random.default_rng(5))
+    for frame in range(60):
+        body = pose(25.0 - 0.4 * frame, 0.3, -0.1, 0.05)
+        one, other = (unit.detect(body, frame / 30.0) for unit in (at_once, by_steps))
+        for name in ("xyxy", "centre_px", "score", "class_id"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        assert at_once.exposure.sensitivity_s == by_steps.exposure.sensitivity_s
+    disturbed = NuisanceCfg(flicker="mild"), NuisanceCfg(daylight="mild"), NuisanceCfg(surface_reflection="mild")
+    assert not any(sensor(nuisance=nuisance).lit.is_plain for nuisance in disturbed)
