@@ -51,13 +51,13 @@ class Association(Protocol):
         ...
 
 
-def pose_estimate(solution: PnpSolution, beacon_ids: tuple[int, ...], error_px: float, measured: bool) -> PoseEstimate:
+def pose_estimate(solution: PnpSolution, beacon_ids: tuple[int, ...], measured: bool) -> PoseEstimate:
     """The contract's form of a solution."""
     return PoseEstimate(
         T_station_camera=solution.T_station_camera(),
         covariance=solution.covariance(),
         beacon_ids=beacon_ids,
         solver=solution.solver,
-        reprojection_error_px=error_px,
+        reprojection_error_px=solution.error_px,
         measured=measured,
     )

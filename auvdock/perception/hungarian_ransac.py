@@ -144,6 +144,5 @@ class HungarianRansacAssociation:
         solution = self._solver.plain(points[kept], pixels[kept], sigma, prior)
         if solution is None or not math.isfinite(solution.cost):
             return None
-        error = float(solution.residual_px.mean())
-        pose = pose_estimate(solution, tuple(ids[kept].tolist()), error, True)
+        pose = pose_estimate(solution, tuple(ids[kept].tolist()), True)
         return Associated(pose, len(ids), solution)

@@ -20,14 +20,26 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.errors import ConfigError
-from auvdock.perception.pnp_refine import attitude_weight, pose_covariance, refine, rotation_of, vector_of
+from auvdock.perception.pnp_refine import (
+    ATTITUDE,
+    COST,
+    COVARIANCE,
+    ERROR,
+    PIXEL,
+    RESIDUAL,
+    ROTATION,
+    SEEN,
+    SIGMA,
+    TRANSFORM,
+    TRANSLATION,
+    solve_from,
+    vector_of,
+)
 
-__all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "translation_from_rotation"]
+__all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "light_table", "translation_from_rotation"]
 
 _DECREMENT = 1e-9
 _DECREMENT_TRACKED = 1e-4
-_EYE_3 = np.eye(3)
-_NO_VECTOR, _NO_WEIGHT = np.zeros(3), np.zeros((3, 3))
 
 
 @dataclass(frozen=True)
@@ -58,34 +70,45 @@ class PnpSolution(NamedTuple):
     """A pose of the station in the camera frame, p_camera = R p_station + t.
 
     Attributes:
-        rotation_vector: (3,) Rodrigues vector of R.
-        rotation: (3, 3) R.
-        translation_m: (3,) t.
-        residual_px: (n,) distance between each observed light and its reprojection, to a hundredth of its σ.
-        normal: (6, 6) lower Cholesky factor of JᵀWJ over (rotation vector, t), prior included; what stands above its
-            diagonal means nothing.
+        numbers: (70 + n,) all that `solve_from` tells of it.
         attitude_error_rad: angle to the attitude prior.
         cost: χ² of the reprojection and of the attitude prior, if that is in use.
         solver: name of the solver.
     """
 
-    rotation_vector: Array
-    rotation: Array
-    translation_m: Array
-    residual_px: Array
-    normal: Array
+    numbers: Array
     attitude_error_rad: float
     cost: float
     solver: str
 
+    @property
+    def rotation_vector(self) -> Array:
+        """(3,) Rodrigues vector of R."""
+        return self.numbers[:TRANSLATION]
+
+    @property
+    def translation_m(self) -> Array:
+        """(3,) t."""
+        return self.numbers[TRANSLATION:ROTATION]
+
+    @property
+    def rotation(self) -> Array:
+        """(3, 3) R."""
+        return self.numbers[ROTATION:TRANSFORM].reshape(3, 3)
+
+    @property
+    def residual_px(self) -> Array:
+        """(n,) distance between each light and its reprojection, to a hundredth of its σ."""
+        return self.numbers[RESIDUAL:]
+
+    @property
+    def error_px(self) -> float:
+        """Mean residual of the lights that were seen, or of all where none was."""
+        return self.numbers.item(ERROR)
+
     def T_station_camera(self) -> Array:
         """(4, 4) pose of the camera in the station frame: [Rᵀ, -Rᵀ t]."""
-        transform = np.zeros((4, 4))
-        transform[3, 3] = 1.0
-        back = self.rotation.T
-        transform[:3, :3] = back
-        transform[:3, 3] = -back.dot(self.translation_m)
-        return transform
+        return self.numbers[TRANSFORM:COVARIANCE].reshape(4, 4)
 
     def covariance(self) -> Array:
         """(6, 6) covariance of (camera position in the station frame, small rotation in the camera frame).
@@ -93,7 +116,7 @@ class PnpSolution(NamedTuple):
         With Σ = (JᵀWJ)⁻¹ over (r, t), δ = J_l(r) dr a small rotation of the camera axes: d(position) =
         -Rᵀ (dt + t × δ), and the camera turns by -δ.
         """
-        return pose_covariance(self.rotation_vector, self.rotation, self.translation_m, self.normal)
+        return self.numbers[COVARIANCE:ATTITUDE].reshape(6, 6)
 
 
 class PnpSolver:
@@ -108,10 +131,13 @@ class PnpSolver:
         self._attitude_weight = 1.0 / math.radians(cfg.attitude_sigma_deg) ** 2
         prior = math.radians(cfg.attitude_prior_sigma_deg)
         self._prior_weight = 1.0 / prior**2 if prior > 0.0 else 0.0
+        lens = (camera.matrix[0, 0], camera.matrix[1, 1], camera.matrix[0, 2], camera.matrix[1, 2])
+        self._terms = np.array([*lens, *camera.distortion, self._prior_weight])
         self.heading_sigma_rad: float | None = None
         """Standard deviation of the prior's turn about the station's upright axis, where it is worse than the rest."""
         self._max_attitude_rad = math.radians(cfg.max_attitude_error_deg)
         self._ambiguous_rad = math.radians(2.0 * cfg.attitude_sigma_deg)
+        self._clear_rad = min(self._ambiguous_rad, self._max_attitude_rad)
 
     def solve(
         self,
@@ -130,17 +156,25 @@ class PnpSolver:
             rotation_prior: (3, 3) R of the vehicle's own attitude (camera from station axes).
             start: the last frame's solution: refined directly, without the solver chosen by count.
         """
-        n = len(pixels)
+        return self.solve_lights(light_table(points_m, pixels, sigma_px), rotation_prior, start)
+
+    def solve_lights(
+        self, lights: Array, rotation_prior: Array, start: PnpSolution | None = None
+    ) -> PnpSolution | None:
+        """The same from a table (n, 7) of lights, some of them perhaps predicted: see `light_table`."""
+        n = len(lights)
         if n < 3:
             return None
-        tried: list[PnpSolution | None] = []
+        first = None
         if start is not None:
-            tried.append(self._refine(start, points_m, pixels, sigma_px, rotation_prior, "tracked"))
+            first = self._refine(start.numbers, lights, rotation_prior, "tracked")
         elif n >= 5:
-            tried.append(self._sqpnp(points_m, pixels, sigma_px, rotation_prior))
-        first = tried[0] if tried else None
+            first = self._sqpnp(lights, rotation_prior)
+        if first is not None and first.attitude_error_rad <= self._clear_rad:
+            return first
+        tried = [first]
         if first is None or first.attitude_error_rad > self._ambiguous_rad:
-            tried.append(self._from_prior(points_m, pixels, sigma_px, rotation_prior))
+            tried.append(self._from_prior(lights, rotation_prior))
         found = [
             solution
             for solution in tried
@@ -157,8 +191,8 @@ class PnpSolver:
             return None
         if not ok:
             return None
-        start = (_vector(rotation), _vector(translation))
-        return self._refine(start, points_m, pixels, sigma_px, rotation_prior, "plain")
+        start = _pose(rotation, translation)
+        return self._refine(start, light_table(points_m, pixels, sigma_px), rotation_prior, "plain")
 
     def project(self, solution: PnpSolution, points_m: Array) -> Array:
         """(k, 2) pixels of station points (k, 3) under a solution."""
@@ -170,64 +204,35 @@ class PnpSolver:
     def _judge(self, solution: PnpSolution) -> float:
         return solution.cost + self._attitude_weight * solution.attitude_error_rad**2
 
-    def _sqpnp(self, points: Array, pixels: Array, sigma: Array, prior: Array) -> PnpSolution | None:
+    def _sqpnp(self, lights: Array, prior: Array) -> PnpSolution | None:
+        points, pixels = _parts(lights)
         xy = self._camera.normalise(pixels)
         ok, rotation, translation = cv2.solvePnP(points, xy, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
-        if not ok:
-            return None
-        start = (_vector(rotation), _vector(translation))
-        return self._refine(start, points, pixels, sigma, prior, "sqpnp")
+        return self._refine(_pose(rotation, translation), lights, prior, "sqpnp") if ok else None
 
-    def _from_prior(self, points: Array, pixels: Array, sigma: Array, prior: Array) -> PnpSolution | None:
+    def _from_prior(self, lights: Array, prior: Array) -> PnpSolution | None:
+        points, pixels = _parts(lights)
         translation = translation_from_rotation(prior, points, self._camera.normalise(pixels))
         if translation is None:
             return None
-        return self._refine((_rodrigues(prior), translation), points, pixels, sigma, prior, "iterative")
+        return self._refine(_pose(vector_of(prior), translation), lights, prior, "iterative")
 
-    def _refine(
-        self,
-        start: PnpSolution | tuple[Array, Array],
-        points: Array,
-        pixels: Array,
-        sigma: Array,
-        prior: Array,
-        solver: str,
-    ) -> PnpSolution | None:
-        """Levenberg–Marquardt on the weighted reprojection error."""
-        if isinstance(start, PnpSolution):
-            pose, decrement = np.concatenate([start.rotation_vector, start.translation_m]), _DECREMENT_TRACKED
-        else:
-            pose, decrement = np.concatenate(start), _DECREMENT
-        expected, weight = self._prior_terms(prior)
-        good, pose, residual, factor, cost = refine(
-            pose, points, pixels, sigma, self._matrix, self._distortion, expected, weight, decrement
-        )
-        if not good:
-            return None
-        rotation = rotation_of(pose[:3])
-        cosine = (float(np.vdot(rotation, prior)) - 1.0) / 2.0
-        return PnpSolution(
-            rotation_vector=pose[:3],
-            rotation=rotation,
-            translation_m=pose[3:],
-            residual_px=np.hypot(residual[:, 0], residual[:, 1]),
-            normal=factor,
-            attitude_error_rad=math.acos(max(-1.0, min(1.0, cosine))),
-            cost=cost,
-            solver=solver,
-        )
-
-    def _prior_terms(self, prior: Array) -> tuple[Array, Array]:
-        """The prior's rotation vector (3,) and its weight J_lᵀ W J_l (3, 3), W that of a small rotation; or zeros."""
-        if not self._prior_weight:
-            return _NO_VECTOR, _NO_WEIGHT
-        vector = _rodrigues(prior)
-        weights = self._prior_weight * _EYE_3
+    def _refine(self, start: Array, lights: Array, prior: Array, solver: str) -> PnpSolution | None:
+        """Levenberg–Marquardt on the weighted reprojection error; from the last frame's pose it may stop sooner."""
+        heading_weight = self._prior_weight
         if self.heading_sigma_rad is not None:
-            up = prior[:, 2]
-            heading_weight = min(1.0 / self.heading_sigma_rad**2, self._prior_weight)
-            weights += (heading_weight - self._prior_weight) * np.outer(up, up)
-        return vector, attitude_weight(vector, weights)
+            heading_weight = min(1.0 / self.heading_sigma_rad**2, heading_weight)
+        decrement = _DECREMENT_TRACKED if solver == "tracked" else _DECREMENT
+        numbers = solve_from(start, lights, prior, self._terms, heading_weight, decrement)
+        cost = numbers.item(COST)
+        return PnpSolution(numbers, numbers.item(ATTITUDE), cost, solver) if cost == cost else None
+
+
+def light_table(points_m: Array, pixels: Array, sigma_px: Array) -> Array:
+    """(n, 7) table of seen lights: X, Y, Z in the station frame, m; image u, v and its σ (n,), px; 1 for seen."""
+    table = np.ones((len(pixels), SEEN + 1))
+    table[:, :PIXEL], table[:, PIXEL:SIGMA], table[:, SIGMA] = points_m, pixels, sigma_px
+    return table
 
 
 def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Array | None:
@@ -249,10 +254,11 @@ def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Ar
     return np.array([*(mean_e + mean_xy * depth), depth])
 
 
-def _rodrigues(rotation: Array) -> Array:
-    vector = vector_of(rotation)
-    return vector if math.isfinite(vector[0]) else np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64).ravel()
+def _parts(lights: Array) -> tuple[Array, Array]:
+    """Points (n, 3) and pixels (n, 2) of a table of lights, each of its own memory as OpenCV wants them."""
+    return lights[:, :PIXEL].copy(), lights[:, PIXEL:SIGMA].copy()
 
 
-def _vector(column: NDArray[Any]) -> Array:
-    return np.asarray(column, dtype=np.float64).ravel()
+def _pose(rotation: NDArray[Any], translation: NDArray[Any]) -> Array:
+    """(6,) of a rotation vector and a translation."""
+    return np.concatenate([rotation.ravel(), translation.ravel()], dtype=np.float64)

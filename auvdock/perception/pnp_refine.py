@@ -1,7 +1,9 @@
-"""Levenberg–Marquardt on the reprojection error, and the covariance of its result: the loops of `perception.pnp`.
+"""Levenberg–Marquardt on the reprojection error, and all that follows from its result: the loops of `perception.pnp`.
 
 With y = R X + t, R = exp([r]): ∂y/∂t = 1 and ∂y/∂r = -[R X] J_l(r), J_l the left Jacobian of the rotation group
 (Barfoot 2017, equation 7.77). The image of y is OpenCV's: pinhole, three radial and two tangential terms.
+
+Lights come as one table and results go as one array: Numba takes and gives that at a fraction of what many cost.
 """
 
 from __future__ import annotations
@@ -13,32 +15,104 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.compiled import compiled
 
-__all__ = ["attitude_weight", "left_jacobian", "pose_covariance", "refine", "rotation_of", "vector_of"]
+__all__ = [
+    "ATTITUDE",
+    "COST",
+    "COVARIANCE",
+    "ERROR",
+    "PIXEL",
+    "RESIDUAL",
+    "ROTATION",
+    "SEEN",
+    "SIGMA",
+    "TRANSFORM",
+    "TRANSLATION",
+    "left_jacobian",
+    "refine",
+    "rotation_of",
+    "solve_from",
+    "vector_of",
+]
 
+PIXEL, SIGMA, SEEN = 3, 5, 6
+"""Columns of a table of lights after X, Y, Z: u and v, σ of either, and 1 or 0 for seen or predicted."""
+TRANSLATION, ROTATION, TRANSFORM, COVARIANCE, ATTITUDE, COST, ERROR, RESIDUAL = 3, 6, 15, 31, 67, 68, 69, 70
+"""Where a result's parts begin, after the rotation vector."""
+_FX, _FY, _CX, _CY, _K1, _K2, _P1, _P2, _K3, _PRIOR_WEIGHT = range(10)
 _MAX_ITERATIONS = 20
 
 
 @compiled
+def solve_from(
+    start: Array, lights: Array, prior: Array, terms: Array, heading_weight: float, decrement: float
+) -> Array:
+    """Refine a pose and tell all that is asked about it.
+
+    The cost of an attitude other than the prior's is (r - r₀)ᵀ J_lᵀ W J_l (r - r₀), with W = w of a small rotation
+    about any axis, or w_h about the station's upright one.
+
+    Args:
+        start: (6 or more,) rotation vector r and translation t to start from.
+        lights: (n, 7) table: X, Y, Z in the station frame, m; image u, v and its σ, px; 1 if seen, 0 if predicted.
+        prior: (3, 3) R of the vehicle's own attitude.
+        terms: (10,) fx, fy, cx, cy, k1, k2, p1, p2, k3 of the camera, and w of the prior, 0 for none.
+        heading_weight: w_h, at most w.
+        decrement: expected fall of χ² at which to stop.
+
+    Returns:
+        (70 + n,) r; t; R (3, 3); T_station_camera (4, 4); covariance (6, 6); angle to the prior, rad; χ², nan where it
+        did not end well and nothing else counts; mean of the seen lights' residuals, or of all where none is seen, px;
+        residuals (n,), px.
+    """
+    result = np.empty(RESIDUAL + len(lights))
+    expected, weight = np.zeros(3), np.zeros((3, 3))
+    if terms[_PRIOR_WEIGHT] > 0.0:
+        for i in range(3):
+            weight[i, i] = terms[_PRIOR_WEIGHT]
+            for j in range(3):
+                weight[i, j] += (heading_weight - terms[_PRIOR_WEIGHT]) * (prior[i, 2] * prior[j, 2])
+        expected = vector_of(prior)
+        left = left_jacobian(expected)
+        weight = left.T @ weight @ left
+    good, pose, residual, factor, cost = refine(start[:ROTATION], lights, terms, expected, weight, decrement)
+    if not good:
+        result[COST] = np.nan
+        return result
+    rotation = rotation_of(pose[:TRANSLATION])
+    result[:ROTATION], result[ROTATION:TRANSFORM] = pose, rotation.ravel()
+    # [Rᵀ, -Rᵀ t]
+    transform = result[TRANSFORM:COVARIANCE].reshape((4, 4))
+    transform[:3, :3], transform[3, :3], transform[3, 3] = rotation.T, 0.0, 1.0
+    for i in range(3):
+        transform[i, 3] = -(rotation[0, i] * pose[3] + rotation[1, i] * pose[4] + rotation[2, i] * pose[5])
+    _put_covariance(pose, rotation, factor, result[COVARIANCE:ATTITUDE].reshape((6, 6)))
+    trace = 0.0
+    for i in range(3):
+        for j in range(3):
+            trace += rotation[i, j] * prior[i, j]
+    result[ATTITUDE] = math.acos(max(-1.0, min(1.0, (trace - 1.0) / 2.0)))
+    result[COST] = cost
+    seen = np.sum(lights[:, SEEN])
+    error = 0.0
+    for i in range(len(lights)):
+        size = math.hypot(residual[i, 0], residual[i, 1])
+        result[RESIDUAL + i] = size
+        if lights[i, SEEN] > 0.0 or seen == 0.0:
+            error += size
+    result[ERROR] = error / (seen if seen > 0.0 else len(lights))
+    return result
+
+
+@compiled
 def refine(
-    pose: Array,
-    points: Array,
-    pixels: Array,
-    sigma: Array,
-    matrix: Array,
-    distortion: Array,
-    prior: Array,
-    prior_weight: Array,
-    decrement: float,
+    start: Array, lights: Array, terms: Array, prior: Array, prior_weight: Array, decrement: float
 ) -> tuple[bool, Array, Array, Array, float]:
     """Refine a pose (r, t) (6,) on the weighted reprojection error and a prior of r.
 
     Args:
-        pose: start.
-        points: (n, 3) in the station frame.
-        pixels: (n, 2) their images.
-        sigma: (n,) standard deviation of an image point per axis.
-        matrix: (3, 3) of the camera.
-        distortion: (5,) k1, k2, p1, p2, k3.
+        start: (6,) pose to start from.
+        lights: (n, 7) table as in `solve_from`.
+        terms: (10,) as in `solve_from`.
         prior: (3,) rotation vector.
         prior_weight: (3, 3) W of its cost (r - prior)ᵀ W (r - prior), zeros for none.
         decrement: expected fall of χ² at which to stop.
@@ -47,19 +121,19 @@ def refine(
         Whether it ended well; the pose; residuals (n, 2) of the last pose that was evaluated; lower Cholesky factor
         (6, 6) of JᵀWJ, prior included; χ².
     """
-    count = len(points)
-    best, trial = pose.copy(), pose.copy()
+    count = len(lights)
+    best, trial = start.copy(), start.copy()
     residual, difference = np.zeros((count, 2)), np.zeros((count, 2))
     jacobian = np.zeros((count, 2, 6))
     normal, gradient, factor = np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6))
     damping, cost = 0.0, math.inf
     for _ in range(_MAX_ITERATIONS):
-        _project(trial, points, matrix, distortion, difference, jacobian)
+        _project(trial, lights, terms, difference, jacobian)
         trial_cost = 0.0
         for i in range(count):
             for axis in range(2):
-                difference[i, axis] -= pixels[i, axis]
-                trial_cost += (difference[i, axis] / sigma[i]) ** 2
+                difference[i, axis] -= lights[i, PIXEL + axis]
+                trial_cost += (difference[i, axis] / lights[i, SIGMA]) ** 2
         for i in range(3):
             for j in range(3):
                 trial_cost += (trial[i] - prior[i]) * prior_weight[i, j] * (trial[j] - prior[j])
@@ -69,7 +143,7 @@ def refine(
             best[:], residual[:] = trial, difference
             cost = trial_cost
             damping *= 0.1
-            _normal_equations(jacobian, difference, sigma, best, prior, prior_weight, normal, gradient)
+            _normal_equations(jacobian, difference, lights, best, prior, prior_weight, normal, gradient)
         else:
             damping = max(10.0 * damping, 1e-3)
         factor[:] = normal
@@ -94,7 +168,7 @@ def refine(
 def _normal_equations(
     jacobian: Array,
     difference: Array,
-    sigma: Array,
+    lights: Array,
     pose: Array,
     prior: Array,
     prior_weight: Array,
@@ -107,8 +181,8 @@ def _normal_equations(
     for i in range(3):
         for j in range(3):
             gradient[i] += prior_weight[i, j] * (pose[j] - prior[j])
-    for k in range(len(sigma)):
-        weight = 1.0 / sigma[k] ** 2
+    for k in range(len(lights)):
+        weight = 1.0 / lights[k, SIGMA] ** 2
         for axis in range(2):
             row = jacobian[k, axis]
             for i in range(6):
@@ -121,27 +195,28 @@ def _normal_equations(
 
 
 @compiled
-def _project(pose: Array, points: Array, matrix: Array, distortion: Array, image: Array, jacobian: Array) -> None:
-    """Put the pixels (n, 2) of points (n, 3) under a pose (6,) into `image`, their derivatives into (n, 2, 6)."""
+def _project(pose: Array, lights: Array, terms: Array, image: Array, jacobian: Array) -> None:
+    """Put the pixels (n, 2) of lights (n, 3 or more) under a pose (6,) into `image`, derivatives into (n, 2, 6)."""
     rotation, left = rotation_of(pose[:3]), left_jacobian(pose[:3])
-    k1, k2, p1, p2, k3 = distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]
+    fx, fy, cx, cy = terms[_FX], terms[_FY], terms[_CX], terms[_CY]
+    k1, k2, p1, p2, k3 = terms[_K1], terms[_K2], terms[_P1], terms[_P2], terms[_K3]
     turned, by_r, by_y = np.empty(3), np.empty((3, 3)), np.zeros((2, 3))
-    for n in range(len(points)):
+    for n in range(len(lights)):
         for i in range(3):
-            turned[i] = rotation[i, 0] * points[n, 0] + rotation[i, 1] * points[n, 1] + rotation[i, 2] * points[n, 2]
+            turned[i] = rotation[i, 0] * lights[n, 0] + rotation[i, 1] * lights[n, 1] + rotation[i, 2] * lights[n, 2]
         depth = turned[2] + pose[5]
         per_m = 1.0 / depth if depth != 0.0 else 1.0
         x, y = (turned[0] + pose[3]) * per_m, (turned[1] + pose[4]) * per_m
         r2 = x * x + y * y
         radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
         rise = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2)
-        image[n, 0] = matrix[0, 0] * (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)) + matrix[0, 2]
-        image[n, 1] = matrix[1, 1] * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + matrix[1, 2]
-        xx = matrix[0, 0] * (radial + 2.0 * x * x * rise + 2.0 * p1 * y + 6.0 * p2 * x) * per_m
-        yy = matrix[1, 1] * (radial + 2.0 * y * y * rise + 6.0 * p1 * y + 2.0 * p2 * x) * per_m
+        image[n, 0] = fx * (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)) + cx
+        image[n, 1] = fy * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + cy
+        xx = fx * (radial + 2.0 * x * x * rise + 2.0 * p1 * y + 6.0 * p2 * x) * per_m
+        yy = fy * (radial + 2.0 * y * y * rise + 6.0 * p1 * y + 2.0 * p2 * x) * per_m
         cross = (2.0 * x * y * rise + 2.0 * p1 * x + 2.0 * p2 * y) * per_m
-        by_y[0, 0], by_y[0, 1] = xx, matrix[0, 0] * cross
-        by_y[1, 0], by_y[1, 1] = matrix[1, 1] * cross, yy
+        by_y[0, 0], by_y[0, 1] = xx, fx * cross
+        by_y[1, 0], by_y[1, 1] = fy * cross, yy
         for axis in range(2):
             by_y[axis, 2] = -by_y[axis, 0] * x - by_y[axis, 1] * y
         # -[R X] J_l, column by column.
@@ -158,20 +233,20 @@ def _project(pose: Array, points: Array, matrix: Array, distortion: Array, image
 
 
 @compiled
-def pose_covariance(vector: Array, rotation: Array, translation: Array, factor: Array) -> Array:
-    """(6, 6) covariance of (camera position in the station frame, small rotation in the camera frame).
+def _put_covariance(pose: Array, rotation: Array, factor: Array, covariance: Array) -> None:
+    """Put into (6, 6) the covariance of (camera position in the station frame, small rotation in the camera frame).
 
     With Σ = (JᵀWJ)⁻¹ over (r, t), δ = J_l(r) dr a small rotation of the camera axes: d(position) =
     -Rᵀ (dt + t × δ), and the camera turns by -δ.
 
     Args:
-        vector: (3,) r.
+        pose: (6,) r and t.
         rotation: (3, 3) R.
-        translation: (3,) t.
         factor: (6, 6) lower Cholesky factor of JᵀWJ.
+        covariance: (6, 6) filled.
     """
-    left = left_jacobian(vector)
-    x, y, z = translation[0], translation[1], translation[2]
+    left = left_jacobian(pose[:3])
+    x, y, z = pose[3], pose[4], pose[5]
     to = np.zeros((6, 6))
     for j in range(3):
         a, b, c = y * left[2, j] - z * left[1, j], z * left[0, j] - x * left[2, j], x * left[1, j] - y * left[0, j]
@@ -185,11 +260,9 @@ def pose_covariance(vector: Array, rotation: Array, translation: Array, factor: 
             for k in range(i):
                 to[row, i] -= factor[i, k] * to[row, k]
             to[row, i] /= factor[i, i]
-    covariance = np.empty((6, 6))
     for i in range(6):
         for j in range(i + 1):
             covariance[i, j] = covariance[j, i] = np.sum(to[i] * to[j])
-    return covariance
 
 
 @compiled
@@ -214,7 +287,7 @@ def rotation_of(vector: Array) -> Array:
 
 @compiled
 def vector_of(rotation: Array) -> Array:
-    """(3,) rotation vector of a rotation matrix; nan at half a turn, where the axis has two signs."""
+    """(3,) rotation vector of a rotation matrix; at half a turn that whose first component is not negative."""
     vector = np.empty(3)
     vector[0] = 0.5 * (rotation[2, 1] - rotation[1, 2])
     vector[1] = 0.5 * (rotation[0, 2] - rotation[2, 0])
@@ -224,7 +297,15 @@ def vector_of(rotation: Array) -> Array:
     if sine > 1e-6:
         vector *= math.atan2(sine, cosine) / sine
     elif cosine < 0.0:
-        vector[:] = np.nan
+        # R = 2 a aᵀ - 1: from the greatest component of the axis a, known best, follow the others.
+        k = 0
+        for i in range(1, 3):
+            if rotation[i, i] > rotation[k, k]:
+                k = i
+        for i in range(3):
+            vector[i] = 0.25 * (rotation[i, k] + rotation[k, i]) + (0.5 if i == k else 0.0)
+        size = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+        vector *= (-math.pi if vector[0] < 0.0 else math.pi) / size
     return vector
 
 
@@ -243,13 +324,6 @@ def left_jacobian(vector: Array) -> Array:
     left[1, 0], left[1, 1], left[1, 2] = k * a * b + h * c, sine + k * b * b, k * b * c - h * a
     left[2, 0], left[2, 1], left[2, 2] = k * a * c - h * b, k * b * c + h * a, sine + k * c * c
     return left
-
-
-@compiled
-def attitude_weight(vector: Array, weights: Array) -> Array:
-    """(3, 3) J_lᵀ W J_l: what weights W (3, 3) of a small rotation are for the rotation vector (3,)."""
-    left = left_jacobian(vector)
-    return left.T @ weights @ left
 
 
 @compiled

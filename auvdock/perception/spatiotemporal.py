@@ -10,6 +10,7 @@ from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, Detections
 from auvdock.perception.association import Associated, pose_estimate
 from auvdock.perception.authentication import AuthenticationCfg, Authenticator
+from auvdock.perception.labelled import labelled_lights
 from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
 from auvdock.perception.tracker import LightTracker
 
@@ -20,7 +21,6 @@ _MAX_POSE_AGE = 10
 _MIN_LIT = 3
 _REACQUIRE = 0.15
 _REACQUIRE_PX = 2.0
-_FIRST = np.array(0)
 
 
 class SpatiotemporalAssociation:
@@ -58,7 +58,6 @@ class SpatiotemporalAssociation:
         self._blue_m = np.ascontiguousarray(np.vstack([self._array_m, layout.positions_m[others]]))
         self._authenticator = Authenticator(cfg, self._array_m, self._focal_px)
         self._solver = PnpSolver(pnp, camera)
-        self._sigmas_px = [np.full(count, pixel_sigma_px) for count in range(len(self._array_m) + 1)]
         self.reset()
 
     def reset(self) -> None:
@@ -91,66 +90,48 @@ class SpatiotemporalAssociation:
 
     def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Array) -> Associated | None:
         """Pose from the tracks that carry an identity; clears all identities and returns None if it does not hold."""
-        rows = (tracks.beacon_id >= _FIRST).nonzero()[0]
-        if len(rows) == 0:
+        lights, owners, seen = labelled_lights(
+            tracks.numbers, tracks.labels, detections.centre_px, self._array_m, self._sigma_px
+        )
+        count = len(lights)
+        if count == 0:
             return None
-        rows = rows[tracks.beacon_id[rows].argsort()]
-        seen = rows[tracks.detection[rows] >= _FIRST]
-        if len(seen) >= 4:
-            rows = seen
-        enough = len(rows) >= 4 or (len(seen) == _MIN_LIT and self._last is not None)
+        enough = count >= 4 or (seen == _MIN_LIT and self._last is not None)
         if not enough:
-            if len(rows) < _MIN_LIT:
+            if count < _MIN_LIT:
                 tracks.beacon_id[:] = -1
             return None
-        solution, error = self._verified(tracks, detections, rows, prior)
-        if solution is None and len(seen) >= 5:
-            solution, error, rows = self._without_worst(tracks, detections, rows, prior)
+        solution = self._verified(lights, seen, prior)
+        if solution is None and seen >= 5:
+            solution, owners = self._without_worst(tracks, lights, owners, prior)
+            seen = len(owners)
         if solution is None:
             tracks.beacon_id[:] = -1
             return None
-        count = min(len(seen), len(rows)) if len(seen) >= 4 else len(seen)
-        ids = tuple(tracks.beacon_id[rows].tolist())
-        return Associated(pose_estimate(solution, ids, error, count >= _MIN_LIT), count, solution)
+        ids = tuple(owners[:, 1].tolist())
+        return Associated(pose_estimate(solution, ids, seen >= _MIN_LIT), seen, solution)
 
-    def _verified(
-        self, tracks: LightTracker, detections: Detections, rows: IntArray, prior: Array
-    ) -> tuple[PnpSolution | None, float]:
-        """The pose of the given tracks if it reprojects well, and its mean reprojection error."""
-        detection = tracks.detection[rows]
-        seen = detection >= _FIRST
-        count = np.count_nonzero(seen)
-        if count == len(rows):
-            pixels = detections.centre_px.take(detection, 0)
-            sigma = self._sigmas_px[count]
-        else:
-            pixels = tracks.state[rows, :2].copy()
-            pixels[seen] = detections.centre_px[detection[seen]]
-            sigma = np.where(seen, self._sigma_px, self._sigma_px + np.sqrt(tracks.covariance[rows, 0]))
-        points = self._array_m.take(tracks.beacon_id[rows], 0)
-        solution = self._solver.solve(points, pixels, sigma, prior, self._last)
-        if solution is None:
-            return None, 0.0
-        residual = solution.residual_px[seen] if 0 < count < len(rows) else solution.residual_px
-        error = float(np.add.reduce(residual)) / len(residual)
-        if count and error > self._pnp.max_reprojection_px:
-            return None, error
-        return solution, error
+    def _verified(self, lights: Array, seen: int, prior: Array) -> PnpSolution | None:
+        """The pose of the given lights if those of them that were seen reproject well."""
+        solution = self._solver.solve_lights(lights, prior, self._last)
+        if solution is None or (seen and solution.error_px > self._pnp.max_reprojection_px):
+            return None
+        return solution
 
     def _without_worst(
-        self, tracks: LightTracker, detections: Detections, rows: IntArray, prior: Array
-    ) -> tuple[PnpSolution | None, float, IntArray]:
-        """Leave one light out: a single stray light must not cost the identities of all."""
-        best: tuple[PnpSolution | None, float, IntArray] = (None, np.inf, rows)
-        for index in range(len(rows)):
-            kept = np.delete(rows, index)
-            solution, error = self._verified(tracks, detections, kept, prior)
-            if solution is not None and error < best[1]:
-                best = (solution, error, kept)
-        if best[0] is not None:
-            dropped = np.setdiff1d(rows, best[2])
-            tracks.beacon_id[dropped] = -1
-        return best
+        self, tracks: LightTracker, lights: Array, owners: IntArray, prior: Array
+    ) -> tuple[PnpSolution | None, IntArray]:
+        """Leave one of the seen lights out: a single stray light must not cost the identities of all."""
+        best: PnpSolution | None = None
+        left_out = 0
+        for index in range(len(lights)):
+            solution = self._verified(np.delete(lights, index, axis=0), len(lights) - 1, prior)
+            if solution is not None and (best is None or solution.error_px < best.error_px):
+                best, left_out = solution, index
+        if best is None:
+            return None, owners
+        tracks.beacon_id[owners[left_out, 0]] = -1
+        return best, np.delete(owners, left_out, axis=0)
 
     def _authenticate(self, tracks: LightTracker, prior: Array) -> bool:
         """Name the beacons among the unnamed; True if a proposal holds."""
@@ -189,10 +170,9 @@ class SpatiotemporalAssociation:
             )
             if solution is None:
                 return None
-            error = float(solution.residual_px.mean())
             again = self._match(solution, pixels)
             if np.array_equal(again, identity):
-                return (identity, solution) if error <= self._pnp.max_reprojection_px else None
+                return (identity, solution) if solution.error_px <= self._pnp.max_reprojection_px else None
             identity = again
         return None
 

@@ -1,7 +1,7 @@
 """Kalman tracks of lights in the image: constant velocity, confidence-weighted noise, at most ten predicted frames.
 
-Paper A, section 4.1. All tracks are filtered at once: the axes of one light share their covariance, so a track's 4 × 4
-covariance is three numbers and the whole filter a few array operations.
+Paper A, section 4.1. All tracks are filtered at once (`perception.track_filter`): the axes of one light share their
+covariance, so a track's 4 × 4 covariance is three numbers.
 """
 
 from __future__ import annotations
@@ -11,15 +11,30 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from auvdock.core.arrays import Array, BoolArray, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.core.arrays import Array, IntArray
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
+from auvdock.perception.track_filter import (
+    COVARIANCE,
+    DETECTION,
+    HISTORY,
+    LABELS,
+    MISSED,
+    STATE,
+    advance,
+    distances,
+    filter_terms,
+    settle,
+)
 from auvdock.perception.views import TrackViews
 
 __all__ = ["LightTracker", "TrackerCfg"]
 
 _UNMATCHED_COST = 40.0
+_ROOM = 32
+"""Tracks that there is room for at first."""
+_MARGIN = 0.1
+"""Share of the image by which a track may lie outside it."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +78,11 @@ class LightTracker:
     H = [1, 0], R = σ² / (score + 0.1). Detections are assigned to predictions of their own class by the Hungarian
     method at cost d²/S + 2 ln(S/R), gated at d² / S ≤ gate².
 
+    All arrays are views of two tables that the next frame goes on in.
+
     Attributes:
+        numbers: (n, 7 + window) state, covariance and history side by side.
+        labels: (n, 6) track id, class, beacon, missed, hits and detection side by side.
         state: (n, 4) u, v in px and u̇, v̇ in px/s.
         covariance: (n, 3) per-axis P₀₀ in px², P₀₁ in px²/s, P₁₁ in px²/s².
         track_id: (n,) unique since the last reset.
@@ -78,50 +97,44 @@ class LightTracker:
     def __init__(self, cfg: TrackerCfg, rate_hz: float, width_px: int, height_px: int) -> None:
         """Precompute the filter's constants for a camera's rate and size."""
         self._cfg = cfg
-        self._dt = 1.0 / rate_hz
-        self._limits = (cfg.confirm_hits, cfg.max_predicted_frames, cfg.max_tentative_frames)
-        margin = 0.1
-        self._low = np.array([-margin * width_px, -margin * height_px])
-        self._high = np.array([(1.0 + margin) * width_px, (1.0 + margin) * height_px])
+        self._terms = filter_terms(
+            1.0 / rate_hz,
+            cfg.acceleration_px_s2,
+            cfg.gate_sigmas,
+            cfg.pixel_sigma_px,
+            cfg.initial_speed_px_s,
+            (-_MARGIN * width_px, -_MARGIN * height_px, (1.0 + _MARGIN) * width_px, (1.0 + _MARGIN) * height_px),
+            (cfg.confirm_hits, cfg.max_predicted_frames, cfg.max_tentative_frames),
+        )
         self.reset()
 
     def reset(self) -> None:
         """Forget all tracks."""
-        self.state: Array = np.zeros((0, 4))
-        self.covariance: Array = np.zeros((0, 3))
-        self.history: Array = np.zeros((0, self._cfg.window_frames))
-        self._labels: IntArray = np.zeros((0, 6), dtype=np.int64)
-        self._bind()
+        self._all_numbers = np.zeros((_ROOM, HISTORY + self._cfg.window_frames))
+        self._all_labels = np.zeros((_ROOM, LABELS), dtype=np.int64)
+        self._bind(0)
         self._next_id = 0
         self._slot = 0
 
     def __len__(self) -> int:
         """Number of tracks alive."""
-        return len(self.state)
+        return self._count
 
     def update(self, detections: Detections) -> None:
         """Advance one frame: predict, assign, correct, start new tracks, end old ones."""
-        cfg = self._cfg
-        self._slot = (self._slot + 1) % cfg.window_frames
-        centre, score = detections.centre_px, detections.score
-        variance = cfg.pixel_sigma_px**2 / (score + 0.1)
-        if len(self.state):
-            _predict(self.state, self.covariance, self._dt, cfg.acceleration_px_s2**2)
-            distance = _distances(
-                self.state, self.covariance, self.class_id, centre, detections.class_id, variance, cfg.gate_sigmas**2
-            )
-            matched = self._labels[:, 5]
-            if not _only_pairs(distance, matched):
-                self._assign(distance, variance, matched)
-            _correct(self.state, self.covariance, matched, centre, variance)
-            _count(self._labels, self.history, self._slot, score)
-            alive = _alive(self._labels, self.state, self._limits, self._low, self._high)
-            if not alive.all():
-                self._keep(alive)
-        free = np.ones(len(score), dtype=np.bool_)
-        free[self.detection[self.detection >= 0]] = False
-        if free.any():
-            self._start(free, detections, variance)
+        self._slot = (self._slot + 1) % self._cfg.window_frames
+        centre, score, class_id = detections.centre_px, detections.score, detections.class_id
+        before, terms = self._count, self._terms
+        if before + len(score) > len(self._all_labels):
+            self._make_room(before + len(score))
+        numbers, labels = self._all_numbers, self._all_labels
+        count, next_id = advance(numbers, labels, before, centre, score, class_id, terms, self._slot, self._next_id)
+        if count < 0:
+            self._assign(distances(numbers, labels, before, centre, score, class_id, terms), score)
+            count, next_id = settle(numbers, labels, before, centre, score, class_id, terms, self._slot, self._next_id)
+        self._next_id = next_id
+        if count != before:
+            self._bind(count)
 
     def position_sigma_px(self) -> Array:
         """(n,) standard deviation of each track's position, per axis."""
@@ -137,144 +150,34 @@ class LightTracker:
 
     def views(self) -> TrackViews:
         """The tracks as they are now, for recordings."""
-        return TrackViews(self.state[:, :2], self._labels[:, :4])
+        return TrackViews(self.state[:, :2], self.labels[:, : MISSED + 1])
 
-    def _bind(self) -> None:
-        self.track_id, self.class_id, self.beacon_id, self.missed, self.hits, self.detection = self._labels.T
+    def _bind(self, count: int) -> None:
+        self._count = count
+        self.numbers: Array = self._all_numbers[:count]
+        self.labels: IntArray = self._all_labels[:count]
+        self.state: Array = self.numbers[:, STATE:COVARIANCE]
+        self.covariance: Array = self.numbers[:, COVARIANCE:HISTORY]
+        self.history: Array = self.numbers[:, HISTORY:]
+        self.track_id, self.class_id, self.beacon_id, self.missed, self.hits, self.detection = self.labels.T
 
-    def _assign(self, distance: Array, variance: Array, matched: IntArray) -> None:
+    def _make_room(self, least: int) -> None:
+        """For as many tracks and more."""
+        numbers, labels = self.numbers, self.labels
+        self._all_numbers = np.zeros((2 * least, numbers.shape[1]))
+        self._all_labels = np.zeros((2 * least, LABELS), dtype=np.int64)
+        self._all_numbers[: self._count], self._all_labels[: self._count] = numbers, labels
+        self._bind(self._count)
+
+    def _assign(self, distance: Array, score: Array) -> None:
         """The Hungarian method, where several could be paired."""
+        variance = self._cfg.pixel_sigma_px**2 / (score + 0.1)
         allowed = np.isfinite(distance)
         spread = self.covariance[:, :1] + variance
         # A stale track has a wide gate: the log term keeps it from taking the detection of a sharp one.
         cost = np.where(allowed, distance + 2.0 * np.log(spread / variance), _UNMATCHED_COST)
         rows, columns = linear_sum_assignment(cost)
         kept = allowed[rows, columns]
+        matched = self.labels[:, DETECTION]
         matched.fill(-1)
         matched[rows[kept]] = columns[kept]
-
-    def _keep(self, alive: BoolArray) -> None:
-        self.state, self.covariance = self.state.compress(alive, 0), self.covariance.compress(alive, 0)
-        self.history, self._labels = self.history.compress(alive, 0), self._labels.compress(alive, 0)
-        self._bind()
-
-    def _start(self, free: BoolArray, detections: Detections, variance: Array) -> None:
-        index = np.flatnonzero(free)
-        count = len(index)
-        state = np.zeros((count, 4))
-        state[:, :2] = detections.centre_px[index]
-        covariance = np.zeros((count, 3))
-        covariance[:, 0] = variance[index]
-        covariance[:, 2] = self._cfg.initial_speed_px_s**2
-        history = np.zeros((count, self._cfg.window_frames))
-        history[:, self._slot] = detections.score[index]
-        labels = np.zeros((count, 6), dtype=np.int64)
-        labels[:, 0] = np.arange(self._next_id, self._next_id + count)
-        labels[:, 1] = detections.class_id[index]
-        labels[:, 2] = -1
-        labels[:, 4] = 1
-        labels[:, 5] = index
-        self._next_id += count
-        self.state = np.concatenate([self.state, state])
-        self.covariance = np.concatenate([self.covariance, covariance])
-        self.history = np.concatenate([self.history, history])
-        self._labels = np.concatenate([self._labels, labels])
-        self._bind()
-
-
-@compiled
-def _predict(state: Array, covariance: Array, dt: float, power: float) -> None:
-    """F x and F P Fᵀ + Q of all tracks, in place."""
-    for i in range(len(state)):
-        for axis in range(2):
-            state[i, axis] += dt * state[i, 2 + axis]
-        p01, p11 = covariance[i, 1], covariance[i, 2]
-        covariance[i, 0] += dt * (2.0 * p01 + dt * p11) + 0.25 * dt**4 * power
-        covariance[i, 1] += dt * p11 + 0.5 * dt**3 * power
-        covariance[i, 2] += dt**2 * power
-
-
-@compiled
-def _distances(
-    state: Array,
-    covariance: Array,
-    class_id: IntArray,
-    centre: Array,
-    centre_class: IntArray,
-    variance: Array,
-    gate: float,
-) -> Array:
-    """(n, m) d² / S of tracks and detections; `inf` beyond the gate and between classes."""
-    distance = np.full((len(state), len(centre)), np.inf)
-    for i in range(len(state)):
-        for j in range(len(centre)):
-            if class_id[i] != centre_class[j]:
-                continue
-            x, y = state[i, 0] - centre[j, 0], state[i, 1] - centre[j, 1]
-            value = (x * x + y * y) / (covariance[i, 0] + variance[j])
-            if value <= gate:
-                distance[i, j] = value
-    return distance
-
-
-@compiled
-def _only_pairs(distance: Array, matched: IntArray) -> bool:
-    """Put each track's detection, -1 for none, into `matched`; False where several compete for one.
-
-    Where nobody competes the Hungarian method would find the same.
-    """
-    taken = np.zeros(distance.shape[1], dtype=np.bool_)
-    matched[:] = -1
-    for i in range(distance.shape[0]):
-        for j in range(distance.shape[1]):
-            if distance[i, j] == np.inf:
-                continue
-            if matched[i] >= 0 or taken[j]:
-                return False
-            matched[i], taken[j] = j, True
-    return True
-
-
-@compiled
-def _correct(state: Array, covariance: Array, matched: IntArray, centre: Array, variance: Array) -> None:
-    """Kalman correction of the tracks that have a detection, in place."""
-    for i in range(len(state)):
-        j = matched[i]
-        if j < 0:
-            continue
-        p00, p01 = covariance[i, 0], covariance[i, 1]
-        gain_0, gain_1 = p00 / (p00 + variance[j]), p01 / (p00 + variance[j])
-        for axis in range(2):
-            innovation = centre[j, axis] - state[i, axis]
-            state[i, axis] += gain_0 * innovation
-            state[i, 2 + axis] += gain_1 * innovation
-        covariance[i, 2] -= gain_1 * p01
-        covariance[i, 1] *= 1.0 - gain_0
-        covariance[i, 0] *= 1.0 - gain_0
-
-
-@compiled
-def _count(labels: IntArray, history: Array, slot: int, score: Array) -> None:
-    """Count hits and missed frames, and keep the score."""
-    for i in range(len(labels)):
-        j = labels[i, 5]
-        if j >= 0:
-            labels[i, 3] = 0
-            labels[i, 4] += 1
-            history[i, slot] = score[j]
-        else:
-            labels[i, 3] += 1
-            history[i, slot] = 0.0
-
-
-@compiled
-def _alive(labels: IntArray, state: Array, limits: tuple[int, int, int], low: Array, high: Array) -> BoolArray:
-    """(n,) tracks that go on: not missed for longer than allowed, and not far outside the image.
-
-    A track of `limits[0]` detections or more outlives `limits[1]` frames without one, others `limits[2]`.
-    """
-    alive = np.empty(len(labels), dtype=np.bool_)
-    for i in range(len(labels)):
-        most = limits[1] if labels[i, 4] >= limits[0] else limits[2]
-        alive[i] = labels[i, 3] <= most and low[0] < state[i, 0] < high[0] and low[1] < state[i, 1] < high[1]
-    return alive

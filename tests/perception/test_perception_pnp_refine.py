@@ -6,6 +6,7 @@ import pytest
 
 from auvdock.perception.pnp_refine import _cholesky, _project, _substitute, left_jacobian, rotation_of, vector_of
 
+LENS = (350.0, 347.0, 321.0, 177.5)
 MATRIX = np.array([[350.0, 0.0, 321.0], [0.0, 347.0, 177.5], [0.0, 0.0, 1.0]])
 
 
@@ -17,7 +18,7 @@ def test_pixels_and_derivatives_are_opencvs(distortion):
         pose = np.concatenate([rng.normal(size=3), rng.uniform((-1.0, -1.0, 3.0), (1.0, 1.0, 9.0))])
         points = rng.uniform(-1.0, 1.0, (7, 3))
         pixels, jacobian = np.empty((7, 2)), np.empty((7, 2, 6))
-        _project(pose, points, MATRIX, terms, pixels, jacobian)
+        _project(pose, points, np.array([*LENS, *distortion, 0.0]), pixels, jacobian)
         wanted, derivatives = cv2.projectPoints(points, pose[:3], pose[3:], MATRIX, terms)
         assert pixels == pytest.approx(wanted.reshape(7, 2), abs=1e-9)
         assert jacobian.reshape(14, 6) == pytest.approx(derivatives[:, :6], rel=1e-9, abs=1e-7)

@@ -1,0 +1,63 @@
+"""The lights that carry an identity, gathered from the tracks in one compiled call."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.compiled import compiled
+
+__all__ = ["labelled_lights"]
+
+_COVARIANCE = 4
+_BEACON_ID, _DETECTION = 2, 5
+_MIN_SEEN = 4
+"""From this many beacons on, those seen in this frame stand alone."""
+
+
+@compiled
+def labelled_lights(
+    numbers: Array, labels: IntArray, centre_px: Array, array_m: Array, sigma_px: float
+) -> tuple[Array, IntArray, int]:
+    """The array beacons among the tracks, in the order of their ids.
+
+    Those that were seen in this frame if they are four or more; else predicted ones as well, at their track's place and
+    with their track's σ on top of a detection's.
+
+    Args:
+        numbers: (n, 7 or more) of the tracks, as `LightTracker.numbers`.
+        labels: (n, 6) of the tracks, as `LightTracker.labels`.
+        centre_px: (m, 2) this frame's detections.
+        array_m: (k, 3) array beacons in the station frame.
+        sigma_px: σ of a detection.
+
+    Returns:
+        Table (l, 7) of lights as `PnpSolver.solve_lights` takes it; their tracks and beacons (l, 2); how many were
+        seen.
+    """
+    seen = carried = 0
+    for i in range(len(labels)):
+        if labels[i, _BEACON_ID] >= 0:
+            carried += 1
+            if labels[i, _DETECTION] >= 0:
+                seen += 1
+    count = seen if seen >= _MIN_SEEN else carried
+    lights, owners = np.empty((count, 7)), np.empty((count, 2), dtype=np.int64)
+    row = 0
+    for beacon in range(len(array_m)):
+        for i in range(len(labels)):
+            j = labels[i, _DETECTION]
+            if labels[i, _BEACON_ID] != beacon or (seen >= _MIN_SEEN and j < 0):
+                continue
+            owners[row, 0], owners[row, 1] = i, beacon
+            lights[row, :3] = array_m[beacon]
+            if j >= 0:
+                lights[row, 3], lights[row, 4] = centre_px[j, 0], centre_px[j, 1]
+                lights[row, 5], lights[row, 6] = sigma_px, 1.0
+            else:
+                lights[row, 3], lights[row, 4] = numbers[i, 0], numbers[i, 1]
+                lights[row, 5], lights[row, 6] = sigma_px + math.sqrt(numbers[i, _COVARIANCE]), 0.0
+            row += 1
+    return lights, owners, seen
