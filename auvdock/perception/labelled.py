@@ -11,6 +11,7 @@ from auvdock.core.compiled import compiled
 
 __all__ = ["labelled_lights"]
 
+# Said again from the tracker's tables: a function that Numba keeps does not notice when another file changes.
 _COVARIANCE = 4
 _BEACON_ID, _DETECTION = 2, 5
 _MIN_SEEN = 4

@@ -8,6 +8,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
+from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Bearing, Proprioception
 from auvdock.core.transforms import rotation_from_euler_zyx, wrap_angle
 
@@ -25,15 +26,14 @@ class AttitudePrior:
     """
 
     def __init__(self, camera: Camera, station_yaw_rad: float) -> None:
-        """Precompute the constant factors."""
+        """Keep the mounting and the heading."""
         self._camera_body = np.ascontiguousarray(camera.T_body_camera[:3, :3].T)
-        self._world_station = _turn(station_yaw_rad)
+        self._station_yaw_rad = station_yaw_rad
 
     def rotation(self, proprioception: Proprioception, station_yaw_rad: float | None = None) -> Array:
         """(3, 3) R_camera_station, for the surveyed heading or another."""
-        roll, pitch, yaw = proprioception.euler_zyx_rad.tolist()
-        station = self._world_station if station_yaw_rad is None else _turn(station_yaw_rad)
-        return self._camera_body.dot(rotation_from_euler_zyx(roll, pitch, yaw).T).dot(station)
+        station = self._station_yaw_rad if station_yaw_rad is None else station_yaw_rad
+        return _camera_station(self._camera_body, proprioception.euler_zyx_rad, station)
 
 
 class FacingHeading:
@@ -63,6 +63,16 @@ class FacingHeading:
         return wrap_angle(math.atan2(y, x) + math.pi), _FACING_SIGMA_RAD
 
 
-def _turn(yaw_rad: float) -> Array:
-    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+@compiled
+def _camera_station(camera_body: Array, euler_zyx_rad: Array, station_yaw_rad: float) -> Array:
+    """(3, 3) R_camera_body (Rz(yaw) Ry(pitch) Rx(roll))ᵀ Rz(station yaw)."""
+    roll, pitch, yaw = euler_zyx_rad[0], euler_zyx_rad[1], euler_zyx_rad[2]
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy, cs, ss = math.cos(yaw), math.sin(yaw), math.cos(station_yaw_rad), math.sin(station_yaw_rad)
+    world_body, world_station = np.empty((3, 3)), np.zeros((3, 3))
+    world_body[0, 0], world_body[0, 1], world_body[0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    world_body[1, 0], world_body[1, 1], world_body[1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    world_body[2, 0], world_body[2, 1], world_body[2, 2] = -sp, cp * sr, cp * cr
+    world_station[0, 0], world_station[0, 1], world_station[1, 0], world_station[1, 1] = cs, -ss, ss, cs
+    world_station[2, 2] = 1.0
+    return camera_body @ world_body.T @ world_station

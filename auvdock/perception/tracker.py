@@ -19,7 +19,6 @@ from auvdock.perception.track_filter import (
     DETECTION,
     HISTORY,
     LABELS,
-    MISSED,
     STATE,
     advance,
     distances,
@@ -150,7 +149,7 @@ class LightTracker:
 
     def views(self) -> TrackViews:
         """The tracks as they are now, for recordings."""
-        return TrackViews(self.state[:, :2], self.labels[:, : MISSED + 1])
+        return TrackViews(self.numbers, self.labels)
 
     def _bind(self, count: int) -> None:
         self._count = count

@@ -20,8 +20,8 @@ class TrackViews(Sequence[TrackView]):
         """Copy what the views will show.
 
         Args:
-            centre_px: (n, 2) positions.
-            labels: (n, 4) track id, class id, beacon id (-1 for none), frames missed.
+            centre_px: (n, 2 or more) positions in the first columns.
+            labels: (n, 4 or more) track id, class id, beacon id (-1 for none), frames missed in the first columns.
         """
         self._centre_px = centre_px.copy()
         self._labels = labels.copy()
@@ -47,7 +47,7 @@ class TrackViews(Sequence[TrackView]):
 
     def _views(self) -> tuple[TrackView, ...]:
         if self._made is None:
-            rows = zip(self._labels.tolist(), self._centre_px, strict=True)
+            rows = zip(self._labels[:, :4].tolist(), self._centre_px[:, :2], strict=True)
             self._made = tuple(
                 TrackView(track_id, centre, class_id, beacon_id if beacon_id >= 0 else None, missed)
                 for (track_id, class_id, beacon_id, missed), centre in rows

@@ -4,7 +4,23 @@ import cv2
 import numpy as np
 import pytest
 
-from auvdock.perception.pnp_refine import _cholesky, _project, _substitute, left_jacobian, rotation_of, vector_of
+from auvdock.perception.pnp_refine import (
+    ATTITUDE,
+    COST,
+    COVARIANCE,
+    ERROR,
+    RESIDUAL,
+    ROTATION,
+    TRANSFORM,
+    TRANSLATION,
+    _cholesky,
+    _project,
+    _substitute,
+    left_jacobian,
+    rotation_of,
+    solve_from,
+    vector_of,
+)
 
 LENS = (350.0, 347.0, 321.0, 177.5)
 MATRIX = np.array([[350.0, 0.0, 321.0], [0.0, 347.0, 177.5], [0.0, 0.0, 1.0]])
@@ -48,3 +64,84 @@ def test_cholesky_solves_what_numpy_solves():
     _substitute(factor, found)
     assert found == pytest.approx(np.linalg.solve(matrix, right))
     assert not _cholesky(matrix - 2.0 * np.linalg.eigvalsh(matrix).max() * np.eye(6))
+
+
+@pytest.mark.parametrize(
+    "axis", [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.6, -0.8), (0.5, -0.1, 0.7), (1e-9, 0.1, 1.0)]
+)
+def test_half_a_turn_has_a_vector(axis):
+    """Where the antisymmetric part vanishes, the vector still gives the rotation back."""
+    unit = np.array(axis) / np.linalg.norm(axis)
+    rotation = 2.0 * np.outer(unit, unit) - np.eye(3)
+    vector = vector_of(rotation)
+    assert np.linalg.norm(vector) == pytest.approx(np.pi)
+    assert rotation_of(vector) == pytest.approx(rotation, abs=1e-9)
+    assert vector[0] >= 0.0
+
+
+def scene(rng, count):
+    """Lights of a table, σ and the pose that they are seen from, with a prior some degrees off."""
+    pose = np.concatenate([rng.normal(size=3), rng.uniform((-1.0, -1.0, 3.0), (1.0, 1.0, 9.0))])
+    lights = np.ones((count, 7))
+    lights[:, :3] = rng.uniform(-1.0, 1.0, (count, 3))
+    lights[:, 3:5] = cv2.projectPoints(lights[:, :3].copy(), pose[:3], pose[3:], MATRIX, np.zeros(5))[0].reshape(-1, 2)
+    lights[:, 3:5] += rng.normal(0.0, 0.3, (count, 2))
+    lights[:, 5] = rng.uniform(0.3, 1.0, count)
+    prior = rotation_of(rng.normal(0.0, 0.05, 3)) @ rotation_of(pose[:3])
+    return pose, lights, prior
+
+
+@pytest.mark.parametrize("heading_weight", [200.0, 3.0])
+@pytest.mark.parametrize("unseen", [0, 2, 7])
+def test_all_that_follows_from_a_pose(unseen, heading_weight):
+    """The rest of a result, by NumPy and OpenCV, from the pose in it; that pose is where the gradient vanishes."""
+    rng = np.random.default_rng(8)
+    for _ in range(20):
+        pose, lights, prior = scene(rng, 7)
+        lights[:unseen, 6] = 0.0
+        terms = np.array([*LENS, *np.zeros(5), 200.0])
+        result = solve_from(pose, lights, prior, terms, heading_weight, 1e-12)
+        r, t = result[:TRANSLATION], result[TRANSLATION:ROTATION]
+        rotation = result[ROTATION:TRANSFORM].reshape(3, 3)
+        assert rotation == pytest.approx(cv2.Rodrigues(r)[0], abs=1e-12)
+        transform = result[TRANSFORM:COVARIANCE].reshape(4, 4)
+        assert transform @ np.vstack([np.column_stack([rotation, t]), [0, 0, 0, 1]]) == pytest.approx(
+            np.eye(4), abs=1e-12
+        )
+        image, derivatives = cv2.projectPoints(lights[:, :3].copy(), r, t, MATRIX, np.zeros(5))
+        gap = image.reshape(-1, 2) - lights[:, 3:5]
+        residual = np.linalg.norm(gap, axis=1)
+        assert result[RESIDUAL:] == pytest.approx(residual, abs=1e-4)
+        counted = lights[:, 6] > 0.0 if unseen < 7 else np.ones(7, dtype=bool)
+        assert result[ERROR] == pytest.approx(residual[counted].mean(), abs=1e-4)
+        angle = np.linalg.norm(cv2.Rodrigues(rotation @ prior.T)[0])
+        assert result[ATTITUDE] == pytest.approx(angle, abs=1e-7)
+        # The prior: 200 about any axis but the station's upright one.
+        up = prior[:, 2]
+        turned = left_jacobian(vector_of(prior))
+        weight = turned.T @ (200.0 * np.eye(3) + (heading_weight - 200.0) * np.outer(up, up)) @ turned
+        off = r - vector_of(prior)
+        assert result[COST] == pytest.approx(np.sum((residual / lights[:, 5]) ** 2) + off @ weight @ off, rel=1e-5)
+        jacobian = derivatives[:, :6] / np.repeat(lights[:, 5], 2)[:, None]
+        normal = jacobian.T @ jacobian
+        normal[:3, :3] += weight
+        gradient = jacobian.T @ (gap / lights[:, 5:6]).ravel()
+        gradient[:3] += weight @ off
+        assert gradient @ np.linalg.solve(normal, gradient) < 1e-6
+        # Position -Rᵀ t and the camera's turn, by differences.
+        to = np.empty((6, 6))
+        for k, step in enumerate(1e-6 * np.eye(6)):
+            high, low = cv2.Rodrigues(r + step[:3])[0], cv2.Rodrigues(r - step[:3])[0]
+            to[:3, k] = (-high.T @ (t + step[3:]) + low.T @ (t - step[3:])) / 2e-6
+            turn = high @ low.T
+            to[3:, k] = -0.5 * (turn - turn.T)[[2, 0, 1], [1, 2, 0]] / 2e-6
+        wanted = to @ np.linalg.inv(normal) @ to.T
+        assert result[COVARIANCE:ATTITUDE].reshape(6, 6) == pytest.approx(wanted, rel=1e-3, abs=1e-4 * wanted.max())
+
+
+def test_a_pose_behind_the_camera_has_no_cost():
+    pose, lights, prior = scene(np.random.default_rng(9), 5)
+    pose[5] = -pose[5]
+    lights[:, 3:5] = cv2.projectPoints(lights[:, :3].copy(), pose[:3], pose[3:], MATRIX, np.zeros(5))[0].reshape(-1, 2)
+    result = solve_from(pose, lights, prior, np.array([*LENS, *np.zeros(6)]), 0.0, 1e-9)
+    assert np.isnan(result[COST])

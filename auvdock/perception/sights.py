@@ -1,0 +1,211 @@
+"""Steady lights, their groups and their bearings in one compiled call: the loops of `perception.line_of_sight`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.beacons import BeaconLayout
+from auvdock.core.camera import Camera
+from auvdock.core.compiled import compiled
+
+__all__ = ["CENTRE", "ENTRANCE", "FOLLOWED", "LONG_RANGE", "RANGE", "RAY", "SCORE", "find_sights", "sight_terms"]
+
+RAY, CENTRE, SCORE, RANGE = 0, 3, 5, 6
+"""Where a bearing's parts begin: unit ray in the camera frame, pixel, confidence, range."""
+LONG_RANGE, ENTRANCE, FOLLOWED = 0, 7, 14
+"""Where the two bearings begin, and the track that is followed."""
+_FX, _FY, _CX, _CY, _K1, _K2, _P1, _P2, _K3 = range(9)
+_BLUE_SPREAD, _RED_SPREAD, _CENTRE_X, _CENTRE_Y, _CENTRE_Z = range(9, 14)
+_OCCURRENCES, _MISSED, _GROUP, _LOYALTY = range(14, 18)
+# What is another file's is said again here: a function that Numba keeps does not notice when it changes there.
+_BLUE, _RED = 0, 1
+_TRANSLATION, _ROTATION = 3, 6
+_HISTORY = 7
+_TRACK_LABEL, _CLASS_LABEL, _MISSED_LABEL, _HITS_LABEL = 0, 1, 3, 4
+
+
+def sight_terms(
+    camera: Camera, layout: BeaconLayout, min_occurrences: int, max_missed: int, group_size: int, loyalty: float
+) -> Array:
+    """(18,) camera, spread and place of the lights, and what makes a light steady, as `find_sights` takes them."""
+    blue = layout.indices("array") + layout.indices("long_range")
+    red = layout.indices("entrance")
+    spreads = _spread(layout.positions_m[list(blue)]), _spread(layout.positions_m[list(red)]) if len(red) > 1 else 0.0
+    lens = camera.matrix[0, 0], camera.matrix[1, 1], camera.matrix[0, 2], camera.matrix[1, 2]
+    centre = layout.array_positions_m.mean(axis=0)
+    return np.array(
+        [*lens, *camera.distortion, *spreads, *centre, min_occurrences, max_missed, group_size, loyalty],
+        dtype=np.float64,
+    )
+
+
+@compiled
+def find_sights(numbers: Array, labels: IntArray, pose: Array, terms: Array, followed: int) -> Array:
+    """Long-range and entrance bearings of a frame.
+
+    Args:
+        numbers: (n, 7 + window) of the tracks, as `LightTracker.numbers`.
+        labels: (n, 6) of the tracks, as `LightTracker.labels`.
+        pose: (15 or more,) rotation vector, t and R of the station in the camera frame; (0,) for none.
+        terms: `sight_terms`.
+        followed: track id of the single light that was followed last, -1 for none.
+
+    Returns:
+        (15,) the long-range bearing, the entrance's, and the track followed now. A bearing is its unit ray (3,), its
+        pixel (2,), confidence and range, m; the confidence is nan where there is no bearing, the range where it carries
+        none.
+    """
+    result = np.full(FOLLOWED + 1, np.nan)
+    result[FOLLOWED] = followed
+    lights = np.empty((len(labels), 4))
+    count = _steady(numbers, labels, _RED, terms, lights)
+    if count > 0:
+        _group(lights, count, terms[_RED_SPREAD], terms, result[ENTRANCE:FOLLOWED])
+    long_range = result[LONG_RANGE:ENTRANCE]
+    if len(pose) > 0:
+        _array_centre(pose, terms, long_range)
+        return result
+    count = _steady(numbers, labels, _BLUE, terms, lights)
+    if count >= terms[_GROUP]:
+        _group(lights, count, terms[_BLUE_SPREAD], terms, long_range)
+    elif count > 0:
+        best = _single(lights, count, followed, terms)
+        result[FOLLOWED] = lights[best, 3]
+        _bearing(lights[best, 0], lights[best, 1], lights[best, 2], np.nan, terms, long_range)
+    return result
+
+
+@compiled
+def _steady(numbers: Array, labels: IntArray, class_id: int, terms: Array, lights: Array) -> int:
+    """Put u, v, mean score over the window and track id of each steady light of a class into a row; their number."""
+    window = numbers.shape[1] - _HISTORY
+    least, count = terms[_OCCURRENCES], 0
+    for i in range(len(labels)):
+        if labels[i, _CLASS_LABEL] != class_id or labels[i, _HITS_LABEL] < least:
+            continue
+        if labels[i, _MISSED_LABEL] > terms[_MISSED]:
+            continue
+        occurrences, total = 0, 0.0
+        for k in range(_HISTORY, _HISTORY + window):
+            total += numbers[i, k]
+            if numbers[i, k] != 0.0:
+                occurrences += 1
+        if occurrences >= least:
+            lights[count, 0], lights[count, 1], lights[count, 2] = numbers[i, 0], numbers[i, 1], total / window
+            lights[count, 3] = labels[i, _TRACK_LABEL]
+            count += 1
+    return count
+
+
+@compiled
+def _surest(lights: Array, count: int) -> int:
+    """The first light of the greatest weight."""
+    best = 0
+    for i in range(1, count):
+        if lights[i, 2] > lights[best, 2]:
+            best = i
+    return best
+
+
+@compiled
+def _single(lights: Array, count: int, followed: int, terms: Array) -> int:
+    """The brightest and steadiest light: greatest sum of scores over the window, with loyalty to the last."""
+    best = _surest(lights, count)
+    for i in range(count):
+        if lights[i, 3] == followed and lights[i, 2] >= terms[_LOYALTY] * lights[best, 2]:
+            return i
+    return best
+
+
+@compiled
+def _group(lights: Array, count: int, spread_m: float, terms: Array, bearing: Array) -> None:
+    """Bearing of the group's centre, strays left out; range = spread of the layout over spread of the angles."""
+    n = _without_strays(lights, count)
+    u = v = score = 0.0
+    for i in range(n):
+        u += lights[i, 0]
+        v += lights[i, 1]
+        score += lights[i, 2]
+    u, v, score = u / n, v / n, score / n
+    range_m = np.nan
+    if n >= 3 and spread_m > 0.0:
+        square = 0.0
+        for i in range(n):
+            square += (lights[i, 0] - u) ** 2 + (lights[i, 1] - v) ** 2
+        square /= n
+        if square > 1.0:
+            range_m = spread_m * terms[_FX] / math.sqrt(square)
+    _bearing(u, v, score, range_m, terms, bearing)
+
+
+@compiled
+def _without_strays(lights: Array, count: int) -> int:
+    """Move lights within three median distances of the component-wise median to the front; their number.
+
+    Of two lights that is the surer one.
+    """
+    if count < 3:
+        lights[0] = lights[_surest(lights, count)]
+        return 1
+    u, v = np.sort(lights[:count, 0])[count // 2], np.sort(lights[:count, 1])[count // 2]
+    distance = np.empty(count)
+    for i in range(count):
+        distance[i] = math.hypot(lights[i, 0] - u, lights[i, 1] - v)
+    limit = 3.0 * np.sort(distance)[count // 2] + 2.0
+    kept = 0
+    for i in range(count):
+        if distance[i] <= limit:
+            lights[kept] = lights[i]
+            kept += 1
+    return kept
+
+
+@compiled
+def _array_centre(pose: Array, terms: Array, bearing: Array) -> None:
+    """Bearing of the array's centre under a pose."""
+    rotation = pose[_ROTATION : _ROTATION + 9].reshape((3, 3))
+    centre = np.empty(3)
+    for i in range(3):
+        centre[i] = rotation[i, 0] * terms[_CENTRE_X] + rotation[i, 1] * terms[_CENTRE_Y]
+        centre[i] += rotation[i, 2] * terms[_CENTRE_Z]
+        centre[i] += pose[_TRANSLATION + i]
+    range_m = math.sqrt(centre[0] * centre[0] + centre[1] * centre[1] + centre[2] * centre[2])
+    bearing[RAY:CENTRE] = centre / range_m
+    x, y = centre[0] / centre[2], centre[1] / centre[2]
+    r2 = x * x + y * y
+    p1, p2 = terms[_P1], terms[_P2]
+    radial = 1.0 + r2 * (terms[_K1] + r2 * (terms[_K2] + r2 * terms[_K3]))
+    u = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+    v = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    bearing[CENTRE], bearing[CENTRE + 1] = u * terms[_FX] + terms[_CX], v * terms[_FY] + terms[_CY]
+    bearing[SCORE], bearing[RANGE] = 1.0, range_m
+
+
+@compiled
+def _bearing(u: float, v: float, score: float, range_m: float, terms: Array, bearing: Array) -> None:
+    """Bearing of a pixel; its ray by fixed-point iteration on the lens distortion."""
+    p1, p2 = terms[_P1], terms[_P2]
+    x0, y0 = (u - terms[_CX]) / terms[_FX], (v - terms[_CY]) / terms[_FY]
+    x, y = x0, y0
+    for _ in range(50):
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (terms[_K1] + r2 * (terms[_K2] + r2 * terms[_K3]))
+        x_new = (x0 - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial
+        y_new = (y0 - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial
+        done = abs(x_new - x) + abs(y_new - y) < 1e-10
+        x, y = x_new, y_new
+        if done:
+            break
+    scale = 1.0 / math.sqrt(1.0 + x * x + y * y)
+    bearing[RAY], bearing[RAY + 1], bearing[RAY + 2] = x * scale, y * scale, scale
+    bearing[CENTRE], bearing[CENTRE + 1] = u, v
+    bearing[SCORE], bearing[RANGE] = min(score, 1.0), range_m
+
+
+def _spread(positions_m: Array) -> float:
+    """RMS distance from the centroid, across the approach axis: what the camera sees of it from afar."""
+    across = positions_m[:, 1:] - positions_m[:, 1:].mean(axis=0)
+    return float(np.sqrt((across**2).sum(axis=1).mean()))
