@@ -18,6 +18,8 @@ import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.errors import ConfigError
+from auvdock.perception.proposals import propose, surest_lights
+from auvdock.perception.tracker import LightTracker
 
 __all__ = ["AuthenticationCfg", "Authenticator", "symmetric_pairs"]
 
@@ -78,12 +80,12 @@ class Authenticator:
         self._tolerance = cfg.tolerance_px / focal_px
         self._min_cosine = math.cos(math.radians(cfg.max_angle_deg))
 
-    def candidates(self, occurrences: IntArray, confidence: Array) -> IntArray:
-        """Indices of the tracks that are seen often and surely enough, surest first (algorithm 1, lines 1 to 7)."""
-        good = np.flatnonzero((occurrences >= self._cfg.min_occurrences) & (confidence >= self._cfg.min_confidence))
-        return good[np.argsort(-confidence[good], kind="stable")][: self._cfg.max_candidates]
+    def candidates(self, tracks: LightTracker) -> IntArray:
+        """Rows of the tracks that are seen often and surely enough, surest first (algorithm 1, lines 1 to 7)."""
+        cfg = self._cfg
+        return surest_lights(tracks.numbers, tracks.labels, cfg.min_occurrences, cfg.min_confidence, cfg.max_candidates)
 
-    def propose(self, xy: Array, rotation: Array) -> list[IntArray]:
+    def propose(self, xy: Array, rotation: Array) -> IntArray:
         """Possible identities, best first.
 
         Args:
@@ -91,53 +93,20 @@ class Authenticator:
             rotation: (3, 3) R_camera_station of the vehicle's own attitude.
 
         Returns:
-            Arrays (k,): for each array beacon the index of its candidate, -1 where it is not seen.
+            (m, k) for each proposal and array beacon the index of its candidate, -1 where it is not seen.
         """
-        if len(xy) < self._cfg.min_beacons:
-            return []
-        q = self._points @ rotation.T
-        first, second, low, high = self._pair_up(xy, q)
-        if len(first) == 0:
-            return []
-        translation, valid = _translations(xy, q, first, second, low, high)
-        predicted = q[None] + translation[:, None]
-        valid &= predicted[:, :, 2].min(axis=1) > 0.1
-        predicted, depth = predicted[valid], translation[valid, 2]
-        if len(predicted) == 0:
-            return []
-        image = predicted[:, :, :2] / predicted[:, :, 2:]
-        gap = np.linalg.norm(image[:, :, None] - xy[None, None], axis=3)
-        nearest = gap.argmin(axis=2)
-        distance = np.take_along_axis(gap, nearest[:, :, None], axis=2)[:, :, 0]
-        tolerance = self._cfg.tolerance * self._radius_m / depth + self._tolerance
-        found = distance <= tolerance[:, None]
-        badness = np.where(found, distance / tolerance[:, None], 1.0).sum(axis=1)
-        identities: list[IntArray] = []
-        for index in np.argsort(badness, kind="stable"):
-            if np.count_nonzero(found[index]) < self._cfg.min_beacons:
-                continue
-            identity = _unique(np.where(found[index], nearest[index], -1), distance[index])
-            if np.count_nonzero(identity >= 0) < self._cfg.min_beacons:
-                continue
-            if not any(np.array_equal(identity, other) for other in identities):
-                identities.append(identity)
-                if len(identities) == self._cfg.proposals:
-                    break
-        return identities
-
-    def _pair_up(self, xy: Array, q: Array) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-        """Every ordered pair of candidates and every pair of beacons whose directions agree."""
-        n = len(xy)
-        a, b = np.divmod(np.arange(n * n), n)
-        a, b = a[a != b], b[a != b]
-        low, high = self._pairs[:, 0], self._pairs[:, 1]
-        seen = xy[b] - xy[a]
-        expected = q[high, :2] - q[low, :2]
-        cosine = (seen @ expected.T) / (
-            np.linalg.norm(seen, axis=1)[:, None] * np.linalg.norm(expected, axis=1)[None] + 1e-12
+        cfg = self._cfg
+        return propose(
+            xy,
+            rotation,
+            self._points,
+            self._pairs,
+            self._min_cosine,
+            cfg.tolerance * self._radius_m,
+            self._tolerance,
+            cfg.min_beacons,
+            cfg.proposals,
         )
-        row, column = np.nonzero(cosine >= self._min_cosine)
-        return a[row], b[row], low[column], high[column]
 
 
 def symmetric_pairs(points_m: Array) -> IntArray:
@@ -148,29 +117,3 @@ def symmetric_pairs(points_m: Array) -> IntArray:
     gap = np.linalg.norm(points_m[every[:, 0]] + points_m[every[:, 1]] - 2.0 * centre, axis=1)
     opposite = every[gap < 0.05 * radius]
     return opposite if len(opposite) >= 2 else every
-
-
-def _translations(
-    xy: Array, q: Array, first: IntArray, second: IntArray, low: IntArray, high: IntArray
-) -> tuple[Array, Array]:
-    """Least-squares translation (h, 3) from two images each, rotation known, and whether it lies in front."""
-    image = np.stack([xy[first], xy[second]], axis=1)
-    point = np.stack([q[low], q[high]], axis=1)
-    e = image * point[:, :, 2:] - point[:, :, :2]
-    mean_image, mean_e = image.mean(axis=1), e.mean(axis=1)
-    centred = image - mean_image[:, None]
-    spread = np.einsum("hij,hij->h", centred, centred)
-    depth = -np.einsum("hij,hij->h", centred, e) / np.maximum(spread, 1e-12)
-    return np.column_stack([mean_e + mean_image * depth[:, None], depth]), (depth > 0.1) & (spread > 1e-12)
-
-
-def _unique(identity: IntArray, distance: Array) -> IntArray:
-    """Leave each candidate to the nearest beacon that claims it."""
-    taken: set[int] = set()
-    result = np.full(len(identity), -1, dtype=np.int64)
-    for beacon in np.argsort(distance, kind="stable"):
-        candidate = int(identity[beacon])
-        if candidate >= 0 and candidate not in taken:
-            taken.add(candidate)
-            result[beacon] = candidate
-    return result

@@ -137,10 +137,7 @@ class SpatiotemporalAssociation:
         """Name the beacons among the unnamed; True if a proposal holds."""
         if len(tracks) < self._cfg.min_beacons:
             return False
-        blue = np.flatnonzero((tracks.class_id == BLUE) & (tracks.detection >= 0))
-        if len(blue) < self._cfg.min_beacons:
-            return False
-        chosen = blue[self._authenticator.candidates(tracks.occurrences()[blue], tracks.mean_confidence()[blue])]
+        chosen = self._authenticator.candidates(tracks)
         if len(chosen) < self._cfg.min_beacons:
             return False
         pixels = tracks.state[chosen, :2]

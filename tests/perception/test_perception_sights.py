@@ -34,9 +34,10 @@ def tables(rng: np.random.Generator, count: int, apart_px: float) -> tuple[Array
     """Tracks about one place, some far off, with scores and counts on either side of every threshold."""
     numbers, labels = np.zeros((count, 7 + WINDOW)), np.zeros((count, 6), dtype=np.int64)
     place = rng.uniform((0.0, 0.0), (640.0, 360.0))
-    numbers[:, :2] = place + rng.normal(0.0, apart_px, (count, 2))
+    # Far outside the image no iteration on the distortion ends: OpenCV's as little as ours.
+    numbers[:, :2] = np.clip(place + rng.normal(0.0, apart_px, (count, 2)), 0.0, (639.0, 359.0))
     stray = rng.uniform(size=count) < 0.15
-    numbers[stray, :2] = rng.uniform((0.0, 0.0), (640.0, 360.0), (int(stray.sum()), 2))
+    numbers[stray, :2] = rng.uniform((0.0, 0.0), (639.0, 359.0), (int(stray.sum()), 2))
     numbers[:, 7:] = rng.uniform(0.2, 1.2, (count, WINDOW)) * (rng.uniform(size=(count, WINDOW)) < 0.75)
     labels[:, 0] = rng.permutation(1000)[:count]
     labels[:, 1] = rng.choice([BLUE, RED_CLASS], count)
@@ -101,8 +102,7 @@ def test_bearings_equal_the_plain_ones(seed: int, count: int, apart_px: float, l
     numbers, labels = tables(rng, count, apart_px)
     followed = int(rng.choice(labels[:, 0])) if loyal and count else -1
     found = find_sights(numbers, labels, NO_POSE, TERMS, followed)
-    # Beyond the image's edge OpenCV's iteration and ours both end some 1e-9 short.
-    np.testing.assert_allclose(found, plain(numbers, labels, followed), rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(found, plain(numbers, labels, followed), rtol=1e-9, atol=1e-8)
 
 
 def test_pose_gives_the_array_centre_and_leaves_the_entrance():
@@ -117,7 +117,7 @@ def test_pose_gives_the_array_centre_and_leaves_the_entrance():
         wanted = [*centre / np.linalg.norm(centre), *CAMERA.project(centre[None])[0], 1.0, np.linalg.norm(centre)]
         assert found[LONG_RANGE:ENTRANCE] == pytest.approx(wanted)
         expected = plain(numbers, labels, -1)[ENTRANCE:FOLLOWED]
-        np.testing.assert_allclose(found[ENTRANCE:FOLLOWED], expected, rtol=1e-9, atol=1e-7)
+        np.testing.assert_allclose(found[ENTRANCE:FOLLOWED], expected, rtol=1e-9, atol=1e-8)
         assert found[FOLLOWED] == 7
 
 
