@@ -53,7 +53,8 @@ def labelled_lights(
             if labels[i, _BEACON_ID] != beacon or (seen >= _MIN_SEEN and j < 0):
                 continue
             owners[row, 0], owners[row, 1] = i, beacon
-            lights[row, :3] = array_m[beacon]
+            for k in range(3):
+                lights[row, k] = array_m[beacon, k]
             if j >= 0:
                 lights[row, 3], lights[row, 4] = centre_px[j, 0], centre_px[j, 1]
                 lights[row, 5], lights[row, 6] = sigma_px, 1.0

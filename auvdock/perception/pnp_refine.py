@@ -79,27 +79,29 @@ def solve_from(
         result[COST] = np.nan
         return result
     rotation = rotation_of(pose[:TRANSLATION])
-    result[:ROTATION], result[ROTATION:TRANSFORM] = pose, rotation.ravel()
-    # [Rᵀ, -Rᵀ t]
-    transform = result[TRANSFORM:COVARIANCE].reshape((4, 4))
-    transform[:3, :3], transform[3, :3], transform[3, 3] = rotation.T, 0.0, 1.0
-    for i in range(3):
-        transform[i, 3] = -(rotation[0, i] * pose[3] + rotation[1, i] * pose[4] + rotation[2, i] * pose[5])
-    _put_covariance(pose, rotation, factor, result[COVARIANCE:ATTITUDE].reshape((6, 6)))
+    for i in range(6):
+        result[i] = pose[i]
     trace = 0.0
     for i in range(3):
+        row = TRANSFORM + 4 * i
         for j in range(3):
+            result[ROTATION + 3 * i + j], result[row + j] = rotation[i, j], rotation[j, i]
             trace += rotation[i, j] * prior[i, j]
+        result[row + 3] = -(rotation[0, i] * pose[3] + rotation[1, i] * pose[4] + rotation[2, i] * pose[5])
+        result[TRANSFORM + 12 + i] = 0.0
+    result[TRANSFORM + 15] = 1.0
+    _put_covariance(pose, rotation, factor, result)
     result[ATTITUDE] = math.acos(max(-1.0, min(1.0, (trace - 1.0) / 2.0)))
     result[COST] = cost
-    seen = np.sum(lights[:, SEEN])
-    error = 0.0
+    seen, error, error_seen = 0, 0.0, 0.0
     for i in range(len(lights)):
         size = math.hypot(residual[i, 0], residual[i, 1])
         result[RESIDUAL + i] = size
-        if lights[i, SEEN] > 0.0 or seen == 0.0:
-            error += size
-    result[ERROR] = error / (seen if seen > 0.0 else len(lights))
+        error += size
+        if lights[i, SEEN] > 0.0:
+            seen += 1
+            error_seen += size
+    result[ERROR] = error_seen / seen if seen > 0 else error / len(lights)
     return result
 
 
@@ -125,7 +127,7 @@ def refine(
     best, trial = start.copy(), start.copy()
     residual, difference = np.zeros((count, 2)), np.zeros((count, 2))
     jacobian = np.zeros((count, 2, 6))
-    normal, gradient, factor = np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6))
+    normal, gradient, factor, step = np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6)), np.zeros(6)
     damping, cost = 0.0, math.inf
     for _ in range(_MAX_ITERATIONS):
         _project(trial, lights, terms, difference, jacobian)
@@ -140,28 +142,35 @@ def refine(
         if not math.isfinite(trial_cost):
             return False, best, residual, factor, cost
         if trial_cost <= cost:
-            best[:], residual[:] = trial, difference
             cost = trial_cost
+            for i in range(6):
+                best[i] = trial[i]
+            for i in range(count):
+                residual[i, 0], residual[i, 1] = difference[i, 0], difference[i, 1]
             damping *= 0.1
             _normal_equations(jacobian, difference, lights, best, prior, prior_weight, normal, gradient)
         else:
             damping = max(10.0 * damping, 1e-3)
-        factor[:] = normal
-        if damping > 1e-9:
-            for i in range(6):
+        for i in range(6):
+            for j in range(6):
+                factor[i, j] = normal[i, j]
+            if damping > 1e-9:
                 factor[i, i] += damping * normal[i, i]
         if not _cholesky(factor):
             damping = max(10.0 * damping, 1e-3)
             continue
-        step = gradient.copy()
+        for i in range(6):
+            step[i] = gradient[i]
         _substitute(factor, step)
-        trial[:] = best - step
         # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
-        if np.sum(gradient * step) < decrement and damping <= 1e-9:
+        fall = 0.0
+        for i in range(6):
+            trial[i] = best[i] - step[i]
+            fall += gradient[i] * step[i]
+        if fall < decrement and damping <= 1e-9:
             # Undamped, so the factor is that of the normal matrix itself.
             return trial[5] > 0.0, trial, residual, factor, cost
-    factor[:] = normal
-    return _cholesky(factor) and best[5] > 0.0, best, residual, factor, cost
+    return _cholesky(normal) and best[5] > 0.0, best, residual, normal, cost
 
 
 @compiled
@@ -176,19 +185,21 @@ def _normal_equations(
     gradient: Array,
 ) -> None:
     """Put JᵀWJ and JᵀW times the residuals, prior included, into `normal` (6, 6) and `gradient` (6,)."""
-    normal[:], gradient[:] = 0.0, 0.0
-    normal[:3, :3] = prior_weight
+    for i in range(6):
+        gradient[i] = 0.0
+        for j in range(6):
+            normal[i, j] = 0.0
     for i in range(3):
         for j in range(3):
+            normal[i, j] = prior_weight[i, j]
             gradient[i] += prior_weight[i, j] * (pose[j] - prior[j])
     for k in range(len(lights)):
         weight = 1.0 / lights[k, SIGMA] ** 2
         for axis in range(2):
-            row = jacobian[k, axis]
             for i in range(6):
-                gradient[i] += weight * row[i] * difference[k, axis]
+                gradient[i] += weight * jacobian[k, axis, i] * difference[k, axis]
                 for j in range(i + 1):
-                    normal[i, j] += weight * row[i] * row[j]
+                    normal[i, j] += weight * jacobian[k, axis, i] * jacobian[k, axis, j]
     for i in range(6):
         for j in range(i):
             normal[j, i] = normal[i, j]
@@ -233,8 +244,8 @@ def _project(pose: Array, lights: Array, terms: Array, image: Array, jacobian: A
 
 
 @compiled
-def _put_covariance(pose: Array, rotation: Array, factor: Array, covariance: Array) -> None:
-    """Put into (6, 6) the covariance of (camera position in the station frame, small rotation in the camera frame).
+def _put_covariance(pose: Array, rotation: Array, factor: Array, result: Array) -> None:
+    """Put the covariance (6, 6) of (camera position in the station, small rotation in the camera frame) into a result.
 
     With Σ = (JᵀWJ)⁻¹ over (r, t), δ = J_l(r) dr a small rotation of the camera axes: d(position) =
     -Rᵀ (dt + t × δ), and the camera turns by -δ.
@@ -243,7 +254,7 @@ def _put_covariance(pose: Array, rotation: Array, factor: Array, covariance: Arr
         pose: (6,) r and t.
         rotation: (3, 3) R.
         factor: (6, 6) lower Cholesky factor of JᵀWJ.
-        covariance: (6, 6) filled.
+        result: as `solve_from` returns it.
     """
     left = left_jacobian(pose[:3])
     x, y, z = pose[3], pose[4], pose[5]
@@ -262,7 +273,10 @@ def _put_covariance(pose: Array, rotation: Array, factor: Array, covariance: Arr
             to[row, i] /= factor[i, i]
     for i in range(6):
         for j in range(i + 1):
-            covariance[i, j] = covariance[j, i] = np.sum(to[i] * to[j])
+            value = 0.0
+            for k in range(6):
+                value += to[i, k] * to[j, k]
+            result[COVARIANCE + 6 * i + j] = result[COVARIANCE + 6 * j + i] = value
 
 
 @compiled

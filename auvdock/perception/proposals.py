@@ -193,11 +193,13 @@ def _enter(identity: IntArray, badness: float, proposals: IntArray, badnesses: A
     """Enter a proposal in the list of the best, each identity once at its best; the list's new length."""
     end = count
     for i in range(count):
-        if np.all(proposals[i] == identity):
+        same = True
+        for k in range(len(identity)):
+            same &= proposals[i, k] == identity[k]
+        if same:
             if badnesses[i] <= badness:
                 return count
             end = i
-            break
     if end == count:
         if count < len(badnesses):
             count += 1
@@ -206,7 +208,11 @@ def _enter(identity: IntArray, badness: float, proposals: IntArray, badnesses: A
         end = count - 1
     # Those that are worse move down, over the place of the same identity or the last.
     while end > 0 and badnesses[end - 1] > badness:
-        proposals[end], badnesses[end] = proposals[end - 1], badnesses[end - 1]
+        badnesses[end] = badnesses[end - 1]
+        for k in range(len(identity)):
+            proposals[end, k] = proposals[end - 1, k]
         end -= 1
-    proposals[end], badnesses[end] = identity, badness
+    badnesses[end] = badness
+    for k in range(len(identity)):
+        proposals[end, k] = identity[k]
     return count

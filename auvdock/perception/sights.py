@@ -60,7 +60,7 @@ def find_sights(numbers: Array, labels: IntArray, pose: Array, terms: Array, fol
     """
     result = np.full(FOLLOWED + 1, np.nan)
     result[FOLLOWED] = followed
-    lights = np.empty((len(labels), 4))
+    lights = np.empty((len(labels), 5))
     count = _steady(numbers, labels, _RED, terms, lights)
     if count > 0:
         _group(lights, count, terms[_RED_SPREAD], terms, result[ENTRANCE:FOLLOWED])
@@ -145,35 +145,55 @@ def _group(lights: Array, count: int, spread_m: float, terms: Array, bearing: Ar
 def _without_strays(lights: Array, count: int) -> int:
     """Move lights within three median distances of the component-wise median to the front; their number.
 
-    Of two lights that is the surer one.
+    Of two lights that is the surer one. The last column is for the distances.
     """
     if count < 3:
-        lights[0] = lights[_surest(lights, count)]
+        _move(lights, _surest(lights, count), 0)
         return 1
-    u, v = np.sort(lights[:count, 0])[count // 2], np.sort(lights[:count, 1])[count // 2]
-    distance = np.empty(count)
+    u, v = _upper_median(lights, 0, count), _upper_median(lights, 1, count)
     for i in range(count):
-        distance[i] = math.hypot(lights[i, 0] - u, lights[i, 1] - v)
-    limit = 3.0 * np.sort(distance)[count // 2] + 2.0
+        lights[i, 4] = math.hypot(lights[i, 0] - u, lights[i, 1] - v)
+    limit = 3.0 * _upper_median(lights, 4, count) + 2.0
     kept = 0
     for i in range(count):
-        if distance[i] <= limit:
-            lights[kept] = lights[i]
+        if lights[i, 4] <= limit:
+            _move(lights, i, kept)
             kept += 1
     return kept
 
 
 @compiled
+def _move(lights: Array, row: int, to: int) -> None:
+    """Copy a row into another's place."""
+    for k in range(lights.shape[1]):
+        lights[to, k] = lights[row, k]
+
+
+@compiled
+def _upper_median(lights: Array, column: int, count: int) -> float:
+    """The median of a column's first numbers, of an even number of them the upper one."""
+    for i in range(count):
+        below = 0
+        for k in range(count):
+            if lights[k, column] < lights[i, column] or (lights[k, column] == lights[i, column] and k < i):
+                below += 1
+        if below == count // 2:
+            return lights[i, column]
+    return np.nan
+
+
+@compiled
 def _array_centre(pose: Array, terms: Array, bearing: Array) -> None:
     """Bearing of the array's centre under a pose."""
-    rotation = pose[_ROTATION : _ROTATION + 9].reshape((3, 3))
     centre = np.empty(3)
     for i in range(3):
-        centre[i] = rotation[i, 0] * terms[_CENTRE_X] + rotation[i, 1] * terms[_CENTRE_Y]
-        centre[i] += rotation[i, 2] * terms[_CENTRE_Z]
+        row = _ROTATION + 3 * i
+        centre[i] = pose[row] * terms[_CENTRE_X] + pose[row + 1] * terms[_CENTRE_Y]
+        centre[i] += pose[row + 2] * terms[_CENTRE_Z]
         centre[i] += pose[_TRANSLATION + i]
     range_m = math.sqrt(centre[0] * centre[0] + centre[1] * centre[1] + centre[2] * centre[2])
-    bearing[RAY:CENTRE] = centre / range_m
+    for i in range(3):
+        bearing[RAY + i] = centre[i] / range_m
     x, y = centre[0] / centre[2], centre[1] / centre[2]
     r2 = x * x + y * y
     p1, p2 = terms[_P1], terms[_P2]

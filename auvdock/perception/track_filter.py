@@ -135,12 +135,16 @@ def settle(
         if j >= 0:
             taken[j] = True
         if kept < i:
-            numbers[kept], labels[kept] = numbers[i], labels[i]
+            for k in range(numbers.shape[1]):
+                numbers[kept, k] = numbers[i, k]
+            for k in range(LABELS):
+                labels[kept, k] = labels[i, k]
         kept += 1
     for j in range(len(score)):
         if taken[j]:
             continue
-        numbers[kept] = 0.0
+        for k in range(numbers.shape[1]):
+            numbers[kept, k] = 0.0
         numbers[kept, 0], numbers[kept, 1] = centre[j, 0], centre[j, 1]
         numbers[kept, COVARIANCE], numbers[kept, COVARIANCE + 2] = _variance(score, j, terms), terms[_SPEED]
         numbers[kept, HISTORY + slot] = score[j]
@@ -210,7 +214,8 @@ def _pair(
 
     Where nobody competes the Hungarian method would find the same.
     """
-    labels[:count, DETECTION] = -1
+    for i in range(count):
+        labels[i, DETECTION] = -1
     for j in range(len(score)):
         variance = _variance(score, j, terms)
         taken = False
