@@ -10,12 +10,15 @@ from functools import partial
 import numpy as np
 
 from auvdock.core.arrays import Array, check_shape
+from auvdock.core.compiled import compiled
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import VehicleCfg
 
 __all__ = ["AllocationCfg", "ThrustAllocator"]
 
 _TINY = 1e-9
+_WIDTH = 10
+"""Columns of the table of planar groups."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,16 @@ class ThrustAllocator:
             _Group(self._full, group_rows, columns, fins, inverse_weight, cfg.preload)
             for group_rows, columns in _components(self._full, rows)
         ]
-        self._dead_band = [actuator.dead_band for actuator in vehicle.actuators]
+        self._dead_band = np.array([actuator.dead_band for actuator in vehicle.actuators], dtype=np.float64)
+        self._table = np.zeros((len(self._groups), _WIDTH))
+        start = 0
+        for index, group in enumerate(self._groups):
+            if group.planar is not None:
+                self._table[index] = group.planar
+                self._table[index, :2] = start, start + len(group.columns)
+                start += len(group.columns)
+        flat = [group.members for group in self._groups if group.planar is not None]
+        self._members = np.vstack([np.zeros((0, 5)), *flat])
 
     def effectiveness(self, surge_m_s: float) -> Array:
         """(6, n) B(u): wrench per command at forward speed `surge_m_s` through the water, body axes."""
@@ -92,19 +104,19 @@ class ThrustAllocator:
                 of a share of both: a hull that cannot be held against a cross-current must still turn into it.
         """
         check_shape("wrench_body", wrench_body, (6,))
-        wanted: list[float] = wrench_body.tolist()
-        achieved = [0.0] * 6
-        values = [0.0] * len(self._dead_band)
         effect = surge_m_s * abs(surge_m_s)
-        for group in self._groups:
-            commands = group.solve(wanted, effect, moments_first)
-            group.add_wrench(achieved, commands, effect)
-            for column, value in zip(group.columns, commands, strict=True):
-                band = self._dead_band[column]
-                if -band < value < band:
-                    value = 0.0 if abs(value) <= 0.5 * band else math.copysign(band, value)
-                values[column] = value
-        return np.array(values), np.array(achieved)
+        given = _planar_groups(self._table, self._members, self._dead_band, wrench_body, effect)
+        count = len(self._dead_band)
+        values, achieved = given[:count], given[count : count + 6]
+        if given.item(-1):  # how many groups are left: of more than two axes, or out of reach
+            wanted: list[float] = wrench_body.tolist()
+            for group, is_left in zip(self._groups, given[count + 6 : -1].tolist(), strict=True):
+                if is_left:
+                    commands = group.solve(wanted, effect, moments_first)
+                    group.add_wrench(achieved, commands, effect)
+                    for column, value in zip(group.columns, commands, strict=True):
+                        values[column] = _beyond_dead_band(value, float(self._dead_band[column]))
+        return values, achieved
 
 
 class _Group:
@@ -123,20 +135,19 @@ class _Group:
         self._fins = [fins[column] for column in columns]
         self._inverse_weight = [inverse_weight[column] for column in columns]
         self._effect: list[list[float]] = full[np.ix_(rows, columns)].tolist()
+        second = self._effect[1] if len(rows) > 1 else [0.0] * len(columns)
+        self.members = np.array([columns, self._effect[0], second, self._inverse_weight, self._fins]).T.copy()
         # With at most two axes the closed form needs B W⁻¹ Bᵀ = G_thrusters + (u |u|)² G_fins, symmetric 2 × 2.
-        self._planar = len(rows) <= 2
-        pairs = zip(self._effect[0], self._effect[1] if len(rows) > 1 else [0.0] * len(columns), strict=True)
-        self._columns = [
-            (p, q, weight, fin) for (p, q), weight, fin in zip(pairs, self._inverse_weight, self._fins, strict=True)
-        ]
-        thrusters, moving = _gram(self._columns, fins=False), _gram(self._columns, fins=True)
-        if len(rows) == 1:  # a second axis that nothing acts on and that nothing is asked of
-            thrusters = (thrusters[0], 0.0, 1.0)
-        self._grams = (thrusters, moving)
+        self.planar: Array | None = None
+        if len(rows) <= 2:
+            thrusters, moving = _gram(self.members, fins=False), _gram(self.members, fins=True)
+            if len(rows) == 1:  # a second axis that nothing acts on and that nothing is asked of
+                thrusters = (thrusters[0], 0.0, 1.0)
+            self.planar = np.array([0, len(columns), rows[0], rows[-1], *thrusters, *moving], dtype=np.float64)
         # Without fins B does not depend on speed, and neither does its inverse, nor what gives no wrench.
         self._inverse: Array | None = None
         self._redundant: Array | None = None
-        if not self._planar and not any(self._fins):
+        if self.planar is None and not any(self._fins):
             matrix = np.array(self._effect)
             weighted = matrix * np.array(self._inverse_weight)
             self._inverse = weighted.T @ np.linalg.pinv(weighted @ matrix.T)
@@ -162,19 +173,12 @@ class _Group:
                 return longest(turning, self._least([*wrench[:3], 0.0, 0.0, 0.0], fin_effect))[0]
         return longest(idle, commands)[0]
 
-    def add_wrench(self, wrench: list[float], commands: list[float], fin_effect: float) -> None:
+    def add_wrench(self, wrench: Array, commands: list[float], fin_effect: float) -> None:
         """Add the wrench of the commands."""
-        rows = self.rows
-        if self._planar:
-            x = y = 0.0
-            for command, (p, q, _, fin) in zip(commands, self._columns, strict=True):
-                share = command * fin_effect if fin else command
-                x += p * share
-                y += q * share
-            wrench[rows[0]] += x
-            wrench[rows[-1]] += y  # with one axis y is 0
+        if self.planar is not None:
+            _add_planar(self.planar, self.members, np.array(commands), fin_effect, wrench)
             return
-        for row, line in zip(rows, self._scaled(fin_effect), strict=True):
+        for row, line in zip(self.rows, self._scaled(fin_effect), strict=True):
             wrench[row] += sum(value * command for value, command in zip(line, commands, strict=True))
 
     def _scaled(self, fin_effect: float) -> list[list[float]]:
@@ -186,15 +190,10 @@ class _Group:
 
     def _least(self, wrench: Sequence[float], fin_effect: float) -> list[float]:
         """Commands W⁻¹ Bᵀ (B W⁻¹ Bᵀ)⁻¹ τ, in closed form for one and two axes."""
-        if self._planar:
-            (a, b, d), (fa, fb, fd) = self._grams
-            square = fin_effect * fin_effect
-            a, b, d = a + square * fa, b + square * fb, d + square * fd
-            determinant = a * d - b * b
-            if determinant > _TINY * a * d:
-                x, y = wrench[self.rows[0]], wrench[self.rows[-1]]
-                m, n = (d * x - b * y) / determinant, (a * y - b * x) / determinant
-                return [weight * (p * m + q * n) * (fin_effect if fin else 1.0) for p, q, weight, fin in self._columns]
+        if self.planar is not None:
+            closed = np.empty(len(self.columns))
+            if _least_planar(self.planar, self.members, np.array(wrench), fin_effect, closed):
+                return closed.tolist()
         if self._inverse is not None:
             direct: list[float] = (self._inverse @ np.array([wrench[row] for row in self.rows])).tolist()
             return direct
@@ -205,11 +204,11 @@ class _Group:
         return commands
 
 
-def _gram(columns: Sequence[tuple[float, float, float, bool]], fins: bool) -> tuple[float, float, float]:
+def _gram(members: Array, fins: bool) -> tuple[float, float, float]:
     """Upper triangle of B W⁻¹ Bᵀ over the fins, or over the thrusters, of a planar group."""
     a = b = d = 0.0
-    for p, q, weight, fin in columns:
-        if fin is fins:
+    for _, p, q, weight, fin in members.tolist():
+        if bool(fin) is fins:
             a, b, d = a + weight * p * p, b + weight * p * q, d + weight * q * q
     return a, b, d
 
@@ -321,3 +320,75 @@ def _longest(base: list[float], push: list[float], null: list[float] | None) -> 
     if null is not None:
         commands = [command + shift * part for command, part in zip(commands, null, strict=True)]
     return [min(1.0, max(-1.0, command)) for command in commands], reach
+
+
+@compiled
+def _planar_groups(table: Array, members: Array, dead_band: Array, wrench: Array, fin_effect: float) -> Array:
+    """All groups of at most two axes whose wrench is within reach.
+
+    Args:
+        table: (g, 10) of each group: first and last but one of its members, its two rows, the upper triangles of its
+            Gram matrices of thrusters and of fins; 0 for a group of more axes.
+        members: (m, 5) actuator, its effect on the two rows, inverse weight, whether it is a fin.
+        dead_band: (n,) of the actuators.
+        wrench: (6,) wanted.
+        fin_effect: u |u|.
+
+    Returns:
+        (n + 6 + g + 1,) commands beyond the dead band, the wrench that they give dead band apart, for each group 1 if
+        it is left, and how many are.
+    """
+    count = len(dead_band)
+    out = np.zeros(count + 6 + len(table) + 1)
+    for index in range(len(table)):
+        group = table[index]
+        mine = members[int(group[0]) : int(group[1])]
+        commands = np.empty(len(mine))
+        reached = len(mine) > 0 and _least_planar(group, mine, wrench, fin_effect, commands)
+        for command in commands:
+            reached = reached and -1.0 <= command <= 1.0
+        if not reached:
+            out[count + 6 + index] = 1.0
+            out[-1] += 1.0
+            continue
+        _add_planar(group, mine, commands, fin_effect, out[count : count + 6])
+        for member in range(len(mine)):
+            column = int(mine[member, 0])
+            out[column] = _beyond_dead_band(commands[member], dead_band[column])
+    return out
+
+
+@compiled
+def _least_planar(group: Array, members: Array, wrench: Array, fin_effect: float, commands: Array) -> bool:
+    """Commands W⁻¹ Bᵀ (B W⁻¹ Bᵀ)⁻¹ τ of a planar group, into `commands`; False where the inverse is ill-conditioned."""
+    square = fin_effect * fin_effect
+    a, b, d = group[4] + square * group[7], group[5] + square * group[8], group[6] + square * group[9]
+    determinant = a * d - b * b
+    if not determinant > _TINY * a * d:
+        return False
+    x, y = wrench[int(group[2])], wrench[int(group[3])]
+    m, n = (d * x - b * y) / determinant, (a * y - b * x) / determinant
+    for i in range(len(members)):
+        scale = fin_effect if members[i, 4] != 0.0 else 1.0
+        commands[i] = members[i, 3] * (members[i, 1] * m + members[i, 2] * n) * scale
+    return True
+
+
+@compiled
+def _add_planar(group: Array, members: Array, commands: Array, fin_effect: float, wrench: Array) -> None:
+    """Add the wrench of a planar group's commands."""
+    x = y = 0.0
+    for i in range(len(members)):
+        share = commands[i] * fin_effect if members[i, 4] != 0.0 else commands[i]
+        x += members[i, 1] * share
+        y += members[i, 2] * share
+    wrench[int(group[2])] += x
+    wrench[int(group[3])] += y  # with one axis y is 0
+
+
+@compiled
+def _beyond_dead_band(command: float, band: float) -> float:
+    """A command within the dead band would give nothing: 0 or the band's edge, whichever is nearer."""
+    if not -band < command < band:
+        return command
+    return 0.0 if abs(command) <= 0.5 * band else math.copysign(band, command)

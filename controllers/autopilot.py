@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from auvdock.controllers.control_law import body_wrench
 from auvdock.controllers.gains import AutopilotGains, DesignCfg, design_gains
-from auvdock.controllers.pid import pid_step
-from auvdock.controllers.senses import Rows, Senses, Vector, cross, read_senses, rotate, rotate_back, turn
+from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import ConfigError
@@ -125,7 +125,7 @@ class Autopilot:
         names, rows = ("surge", "sway", "heave", "pitch", "heading", "roll"), (0, 1, 2, 4, 5, 3)
         count = 5 if self.gains.roll is None else 6
         self._rows = rows[:count]
-        self._loops = tuple(self.gains.loops[name].gains for name in names[:count])
+        self._pids = [self.gains.loops[name].gains for name in names[:count]]
         self._depth_gain = self.gains.depth.gains.kp
         thrusters = [index for index, actuator in enumerate(vehicle.actuators) if actuator.kind == "thruster"]
         wrenches = vehicle.thruster_wrenches_body[:, thrusters]
@@ -134,28 +134,37 @@ class Autopilot:
         alone = np.abs(wrenches[1:, np.abs(wrenches[0]) > 1e-9]).max(initial=0.0) < 1e-9
         shares = [1.0 if alone else cfg.force_share, cfg.force_share, cfg.force_share, *[cfg.moment_share] * 3]
         self.limits = tuple(share * reach[row] for share, row in zip(shares, self._rows, strict=False))
-        self._net_weight_n = vehicle.mass_kg * 9.81 - vehicle.buoyancy_n
-        self._drag = [
-            (
-                row,
-                column,
-                float(vehicle.linear_damping_body[row, column]),
-                float(vehicle.quadratic_damping_body[row, column]),
-                float(vehicle.lift_damping_body[row, column]),
-            )
-            for row in range(6)
-            for column in range(3)
-            if vehicle.linear_damping_body[row, column] != 0.0
-            or vehicle.quadratic_damping_body[row, column] != 0.0
-            or vehicle.lift_damping_body[row, column] != 0.0
-        ]
-        self._mass = tuple(np.diag(vehicle.rigid_body_mass_body + vehicle.added_mass_body)[:3].tolist())
-        added = vehicle.added_mass_body
-        self._added_mass = tuple(float(added[row, column]) for row in range(3) for column in range(3))
+        self._loops = np.array(
+            [
+                [row, pid.kp, pid.ki, pid.kd, limit]
+                for row, pid, limit in zip(self._rows, self._pids, self.limits, strict=True)
+            ]
+        )
+        net_weight_n = vehicle.mass_kg * 9.81 - vehicle.buoyancy_n
+        self._law = np.array(
+            [
+                cfg.surge_acceleration_m_s2,
+                cfg.sway_acceleration_m_s2,
+                cfg.max_speed_error_m_s,
+                cfg.integral_zone_rad,
+                net_weight_n,
+                dt_s,
+            ]
+        )
+        mass = np.diag(vehicle.rigid_body_mass_body + vehicle.added_mass_body)
+        self._hull = np.vstack(
+            [
+                vehicle.linear_damping_body[:, :3],
+                vehicle.quadratic_damping_body[:, :3],
+                vehicle.lift_damping_body[:, :3],
+                vehicle.added_mass_body[:3, :3],
+                mass[:3],
+            ]
+        )
 
     def initial_state(self) -> AutopilotState:
         """At rest, integrals empty."""
-        return AutopilotState(integrals=(0.0,) * len(self._loops))
+        return AutopilotState(integrals=(0.0,) * len(self._pids))
 
     def step(
         self, state: AutopilotState, setpoint: AutopilotSetpoint, proprioception: Proprioception
@@ -167,77 +176,33 @@ class Autopilot:
         self, state: AutopilotState, setpoint: AutopilotSetpoint, senses: Senses
     ) -> tuple[Array, AutopilotState]:
         """As `step`, from unpacked senses."""
-        cfg, dt_s = self._cfg, self._dt_s
-        world = turn(senses.level, senses.yaw_rad)
-        current = self._current(state.current_m_s, senses, world)
-        measured = senses.water_m_s if setpoint.through_water else senses.ground_m_s
-
+        cfg = self._cfg
+        bound = cfg.max_heading_error_rad
         heave = setpoint.heave_m_s
         if setpoint.depth_m is not None:
             heave = _clip(self._depth_gain * (senses.depth_m - setpoint.depth_m), cfg.max_heave_m_s)
-        before = state.references_m_s
-        now = rotate(senses.level, measured)
-        references = (
-            self._shape(before[0], setpoint.surge_m_s, now[0], cfg.surge_acceleration_m_s2),
-            self._shape(before[1], setpoint.sway_m_s, now[1], cfg.sway_acceleration_m_s2),
-            self._shape(before[2], heave, now[2], cfg.sway_acceleration_m_s2),
-        )
-        # Level heading frame to body: the same rotation without its yaw.
-        level = senses.level
-        wanted = rotate_back(level, references)
-        through_water = wanted
-        if not setpoint.through_water:
-            drift = rotate_back(world, current)
-            through_water = (wanted[0] - drift[0], wanted[1] - drift[1], wanted[2] - drift[2])
-        feed = self._balance(through_water)
-        surge_bound, sway_bound = cfg.surge_acceleration_m_s2, cfg.sway_acceleration_m_s2
-        push = rotate_back(
-            level,
-            (
-                self._mass[0] * _clip((references[0] - before[0]) / dt_s, surge_bound),
-                self._mass[1] * _clip((references[1] - before[1]) / dt_s, sway_bound),
-                self._mass[2] * _clip((references[2] - before[2]) / dt_s, sway_bound),
-            ),
-        )
-        lift = rotate_back(level, (0.0, 0.0, self._net_weight_n))
-
-        bound = cfg.max_heading_error_rad
-        pitch_error = _clip(math.remainder(setpoint.pitch_rad - senses.pitch_rad, math.tau), bound)
-        heading_error = _clip(math.remainder(setpoint.heading_rad - senses.yaw_rad, math.tau), bound)
-        p, q, r = senses.rate_rad_s
-        errors = (
-            wanted[0] - measured[0],
-            wanted[1] - measured[1],
-            wanted[2] - measured[2],
-            pitch_error,
-            heading_error,
+        # The first sample of the current counts in full.
+        current = state.current_m_s
+        smoothing, current = (self._smoothing, current) if current is not None else (1.0, (0.0, 0.0, 0.0))
+        out = body_wrench(
+            np.array((*state.references_m_s, *current, *state.integrals)),
+            senses.motion,
+            senses.yaw_rad,
+            setpoint.surge_m_s,
+            setpoint.sway_m_s,
+            heave,
+            setpoint.through_water,
+            _clip(math.remainder(setpoint.pitch_rad - senses.pitch_rad, math.tau), bound),
+            _clip(math.remainder(setpoint.heading_rad - senses.yaw_rad, math.tau), bound),
             _clip(setpoint.roll_rad - senses.roll_rad, bound),
+            setpoint.turn_rad_s,
+            smoothing,
+            self._law,
+            self._loops,
+            self._hull,
         )
-        rates = (0.0, 0.0, 0.0, q, r - setpoint.turn_rad_s, p)
-        feeds = (
-            feed[0] + lift[0] + push[0],
-            feed[1] + lift[1] + push[1],
-            feed[2] + lift[2] + push[2],
-            feed[4],
-            feed[5],
-            feed[3],
-        )
-        wrench = np.zeros(6)
-        integrals: list[float] = []
-        for axis, row in enumerate(self._rows):
-            output, integral = pid_step(
-                self._loops[axis],
-                state.integrals[axis],
-                errors[axis],
-                rates[axis],
-                feeds[axis],
-                self.limits[axis],
-                dt_s,
-            )
-            wrench[row] = output
-            turning = axis >= 3 and abs(errors[axis]) > cfg.integral_zone_rad
-            integrals.append(state.integrals[axis] if turning else integral)
-        return wrench, AutopilotState(tuple(integrals), references, current)
+        ahead, port, up, x, y, z, *integrals = out[6:].tolist()
+        return out[:6], AutopilotState(tuple(integrals), (ahead, port, up), (x, y, z))
 
     def settle(self, state: AutopilotState, wanted: Array, achieved: Array) -> AutopilotState:
         """Anti-windup for what allocation could not give: İ = (τ_achieved − τ_wanted) k_i/k_p (back-calculation)."""
@@ -246,47 +211,9 @@ class Autopilot:
             return state
         corrected = [
             integral + self._dt_s * missing[row] * gains.ki / max(gains.kp, 1e-9)
-            for integral, row, gains in zip(state.integrals, self._rows, self._loops, strict=True)
+            for integral, row, gains in zip(state.integrals, self._rows, self._pids, strict=True)
         ]
         return AutopilotState(tuple(corrected), state.references_m_s, state.current_m_s)
-
-    def _shape(self, reference: float, target: float, measured: float, acceleration_m_s2: float) -> float:
-        """Next speed reference: towards the target at a bounded rate, not far from the measured speed."""
-        moved = reference + _clip(target - reference, acceleration_m_s2 * self._dt_s)
-        return measured + _clip(moved - measured, self._cfg.max_speed_error_m_s)
-
-    def _current(self, smoothed: Vector | None, senses: Senses, world: Rows) -> Vector:
-        """Current in world axes: ground minus water velocity, smoothed."""
-        ground, water = senses.ground_m_s, senses.water_m_s
-        now = rotate(world, (ground[0] - water[0], ground[1] - water[1], ground[2] - water[2]))
-        if smoothed is None:
-            return now
-        k = self._smoothing
-        return (
-            smoothed[0] + k * (now[0] - smoothed[0]),
-            smoothed[1] + k * (now[1] - smoothed[1]),
-            smoothed[2] + k * (now[2] - smoothed[2]),
-        )
-
-    def _balance(self, velocity: Vector) -> list[float]:
-        """Wrench that balances drag, lift and Munk moment at a steady velocity through the water without rotation."""
-        wrench = [0.0] * 6
-        speed = abs(velocity[0])
-        for row, column, linear, quadratic, lift in self._drag:
-            part = velocity[column]
-            wrench[row] -= (linear + quadratic * abs(part) + lift * speed) * part
-        m = self._added_mass
-        x, y, z = velocity
-        momentum = (
-            m[0] * x + m[1] * y + m[2] * z,
-            m[3] * x + m[4] * y + m[5] * z,
-            m[6] * x + m[7] * y + m[8] * z,
-        )
-        munk = cross(velocity, momentum)
-        wrench[3] += munk[0]
-        wrench[4] += munk[1]
-        wrench[5] += munk[2]
-        return wrench
 
 
 def _clip(value: float, bound: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from auvdock.controllers.allocation import AllocationCfg, ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotState
-from auvdock.controllers.guidance import GuidanceCfg, corridor_m, sway_reach_m_s
+from auvdock.controllers.guidance import GuidanceCfg, axis_law, corridor_m, sway_reach_m_s
 from auvdock.controllers.modes import (
     ABORT,
     ACQUIRE,
@@ -25,7 +25,7 @@ from auvdock.controllers.modes import (
 )
 from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
 from auvdock.controllers.rotating.config import RotatingControlCfg
-from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of, turn
+from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of
 from auvdock.controllers.steering import (
     Place,
     SearchCfg,
@@ -139,8 +139,6 @@ class ConicalPilot:
         self.cfg = cfg
         self.autopilot = Autopilot(vehicle, cfg.autopilot, dt_s)
         self.allocator = ThrustAllocator(vehicle, cfg.allocation)
-        self._dt_s = dt_s
-        self._filter = RelativeFilter(cfg.filter, camera.T_body_camera, dt_s)
         self._R_body_camera = rows_of(camera.T_body_camera[:3, :3])
         lever = camera.T_body_camera[:3, 3]
         self._camera_to_nose: Vector = (vehicle.nose_x_m - float(lever[0]), -float(lever[1]), -float(lever[2]))
@@ -149,11 +147,12 @@ class ConicalPilot:
         self._lamp_height_m = float(np.mean(layout.positions_m[list(far), 2])) if far else 0.0
         entrance = layout.indices("entrance")
         centre = layout.positions_m[list(entrance)].mean(axis=0) if entrance else np.array([-1.0, 0.0, 0.0])
-        self._entrance_m: Vector = (float(centre[0]), float(centre[1]), float(centre[2]))
-        self._funnel_length_m = station.funnel.length_m
+        target: Vector = (float(centre[0]), float(centre[1]), float(centre[2]))
+        self._filter = RelativeFilter(cfg.filter, camera.T_body_camera, dt_s, target_m=target)
         self._end_m = station.funnel.length_m + station.funnel.tube_length_m + 0.3
         self._has_entrance = bool(entrance)
         self.reach_m_s = sway_reach_m_s(vehicle, self.allocator, cfg.guidance.mid_speed_m_s, cfg.guidance.sway_share)
+        self._law = axis_law(cfg.guidance, cfg.modes, station.funnel.length_m, self.reach_m_s, dt_s)
         self._pattern = search_pattern(cfg.search)
         self._idle = np.zeros(len(vehicle.actuators))
 
@@ -196,12 +195,29 @@ class ConicalPilot:
             state = state._replace(
                 since_s=senses.time_s, anchor_rad=senses.yaw_rad, anchor_depth_m=senses.depth_m, best_s=senses.time_s
             )
-        relative = self._track(state.relative, percept, senses)
+        before = state.relative
+        relative = self._track(before, percept, senses)
         sight = self._look(state.sight, percept, senses)
         place = self.place(relative, senses) if relative is not None else None
-        jumped = _restarts(relative) > _restarts(state.relative)
-        state = self._progress(state, place, senses.time_s)._replace(relative=relative, sight=sight)
-        return state, place, self._facts(state, place, senses, jumped)
+        best_m, best_s, gate_s = self._progress(state, place, senses.time_s)
+        state = PilotState(
+            state.mode,
+            state.since_s,
+            state.attempts,
+            state.giving_up,
+            relative,
+            sight,
+            state.autopilot,
+            state.integrals,
+            state.offset_rad,
+            state.anchor_rad,
+            state.anchor_depth_m,
+            state.side,
+            best_m,
+            best_s,
+            gate_s,
+        )
+        return state, place, self._facts(state, place, senses, _restarts(relative) > _restarts(before))
 
     def fly(self, state: PilotState, place: Place | None, senses: Senses) -> tuple[Command, PilotState]:
         """The second half: steer in the state's mode and command the actuators."""
@@ -214,12 +230,8 @@ class ConicalPilot:
         pose = percept.pose if percept is not None and percept.pose is not None and percept.pose.measured else None
         if relative is None:
             return self._filter.start(pose, senses) if pose is not None else None
-        relative = self._filter.predict(relative, senses)
-        if pose is not None:
-            relative = self._filter.update_pose(relative, senses, pose)
-        if percept is not None and percept.entrance is not None and self._has_entrance:
-            relative = self._filter.update_bearing(relative, senses, percept.entrance.ray_camera, self._entrance_m)
-        return relative
+        entrance = percept.entrance if percept is not None and self._has_entrance else None
+        return self._filter.advance(relative, senses, pose, entrance.ray_camera if entrance is not None else None)
 
     def _look(self, sight: Sight | None, percept: Percept | None, senses: Senses) -> Sight | None:
         """Last far light after this period; None percepts change nothing."""
@@ -237,60 +249,69 @@ class ConicalPilot:
     def compass_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
         """Compass azimuth, positive to port, and elevation of a bearing in rad."""
         x, y, z = bearing.ray_camera.tolist()
-        body = rotate(self._R_body_camera, (x, y, z))
-        east, north, up = rotate(turn(senses.level, senses.yaw_rad), body)
+        east, north, up = senses.level(senses.yaw_rad, rotate(self._R_body_camera, (x, y, z)))
         return math.atan2(north, east), math.atan2(up, math.hypot(east, north))
 
     def place(self, relative: RelativeState, senses: Senses) -> Place:
         """Where the nose is in approach axes."""
         heading = senses.yaw_rad - relative.axis_yaw_rad
-        x, y, z = rotate(turn(senses.level, heading), self._camera_to_nose)
+        x, y, z = senses.level(heading, self._camera_to_nose)
         px, py, pz = relative.camera_m
         # Flying in means looking along -x of the station: port is then -y.
         return Place(
-            distance_m=px + x,
-            port_m=-(py + y),
-            up_m=pz + z,
-            axis_yaw_rad=relative.axis_yaw_rad + math.pi,
-            offset_rad=math.remainder(heading - math.pi, math.tau),
+            px + x,
+            -(py + y),
+            pz + z,
+            relative.axis_yaw_rad + math.pi,
+            math.remainder(heading - math.pi, math.tau),
         )
 
-    def _progress(self, state: PilotState, place: Place | None, now_s: float) -> PilotState:
-        """Note advances along the axis, and since when the vehicle waits at the gate."""
-        if place is None:
-            return state
+    def _progress(self, state: PilotState, place: Place | None, now_s: float) -> tuple[float, float, float | None]:
+        """Best distance, when it was reached, and since when the vehicle waits at the gate."""
         best_m, best_s, gate_s = state.best_m, state.best_s, state.gate_s
+        if place is None:
+            return best_m, best_s, gate_s
         if place.distance_m < best_m - self.cfg.modes.progress_m:
             best_m, best_s = place.distance_m, now_s
         if state.mode != MID or place.distance_m > self.cfg.modes.gate_distance_m + 0.5:
             gate_s = None
         elif gate_s is None:
             gate_s = now_s
-        if best_s == state.best_s and best_m == state.best_m and gate_s == state.gate_s:
-            return state
-        return state._replace(best_m=best_m, best_s=best_s, gate_s=gate_s)
+        return best_m, best_s, gate_s
 
     def _facts(self, state: PilotState, place: Place | None, senses: Senses, jumped: bool) -> Facts:
         now, relative, sight = senses.time_s, state.relative, state.sight
-        least_m = self.cfg.modes.min_blind_range_m
+        since_fix_s = distance_m = off_axis_m = allowed_m = heading_error_rad = sigma_m = since_sight_s = math.inf
+        fixes = sights = 0
+        range_m = None
+        if relative is not None:
+            fixes, since_fix_s, sigma_m = relative.fixes, relative.since_fix_s, relative.cross_track_sigma_m
+        if place is not None:
+            distance_m, off_axis_m = place.distance_m, place.off_axis_m
+            allowed_m = corridor_m(distance_m, self._law)
+            heading_error_rad = abs(place.offset_rad - state.offset_rad)
+        if sight is not None:
+            sights, since_sight_s = sight.frames, now - sight.time_s
+            if since_sight_s < 1.0:
+                range_m = sight.trusted_range_m(self.cfg.modes.min_blind_range_m)
         return Facts(
-            latched=senses.latched,
-            fixes=relative.fixes if relative is not None else 0,
-            since_fix_s=relative.since_fix_s if relative is not None else math.inf,
-            jumped=jumped,
-            distance_m=math.inf if place is None else place.distance_m,
-            off_axis_m=math.inf if place is None else place.off_axis_m,
-            allowed_m=math.inf if place is None else corridor_m(place.distance_m, self.cfg.guidance),
-            heading_error_rad=math.inf if place is None else abs(place.offset_rad - state.offset_rad),
-            sigma_m=relative.cross_track_sigma_m if relative is not None else math.inf,
-            sights=sight.frames if sight is not None else 0,
-            since_sight_s=now - sight.time_s if sight is not None else math.inf,
-            range_m=sight.trusted_range_m(least_m) if sight is not None and now - sight.time_s < 1.0 else None,
-            in_mode_s=now - (state.since_s or 0.0),
-            held_s=now - state.gate_s if state.gate_s is not None else 0.0,
-            stalled_s=now - state.best_s,
-            missed=place is not None and place.distance_m < -self._end_m,
-            giving_up=state.giving_up,
+            senses.latched,
+            fixes,
+            since_fix_s,
+            jumped,
+            distance_m,
+            off_axis_m,
+            allowed_m,
+            heading_error_rad,
+            sigma_m,
+            sights,
+            since_sight_s,
+            range_m,
+            now - (state.since_s or 0.0),
+            now - state.gate_s if state.gate_s is not None else 0.0,
+            now - state.best_s,
+            distance_m < -self._end_m,
+            state.giving_up,
         )
 
     def enter(self, state: PilotState, mode: str, place: Place | None, senses: Senses) -> PilotState:
@@ -342,13 +363,9 @@ class ConicalPilot:
                 mode == MID and (at_gate or (blind and place.distance_m < cfg.modes.commit_distance_m + 1.0)),
                 mode != MID,
                 cfg.guidance.lookahead_mid_m if mode == MID else cfg.guidance.lookahead_near_m,
-                self._funnel_length_m,
                 senses,
                 current,
-                self.reach_m_s,
-                cfg.guidance,
-                cfg.modes,
-                self._dt_s,
+                self._law,
             )
         if mode == ABORT and place is not None:
             return back_off(place, senses, current, self.reach_m_s, cfg.guidance)
@@ -366,7 +383,7 @@ class ConicalPilot:
         """Autopilot, allocation, and the log entry."""
         point = steering.setpoint
         wrench, loops = self.autopilot.advance(state.autopilot, point, senses)
-        values, achieved = self.allocator.solve(wrench, senses.water_m_s[0], moments_first=True)
+        values, achieved = self.allocator.solve(wrench, senses.surge_water_m_s, moments_first=True)
         loops = self.autopilot.settle(loops, wrench, achieved)
         log = {
             "surge_m_s": point.surge_m_s,
@@ -379,12 +396,24 @@ class ConicalPilot:
             log["depth_m"] = point.depth_m
         if place is not None:
             log["distance_m"], log["port_m"], log["up_m"] = place.distance_m, place.port_m, place.up_m
-        state = state._replace(
-            autopilot=loops,
-            integrals=(steering.port_integral, steering.up_integral),
-            offset_rad=steering.offset_rad,
+        after = PilotState(
+            state.mode,
+            state.since_s,
+            state.attempts,
+            state.giving_up,
+            state.relative,
+            state.sight,
+            loops,
+            (steering.port_integral, steering.up_integral),
+            steering.offset_rad,
+            state.anchor_rad,
+            state.anchor_depth_m,
+            state.side,
+            state.best_m,
+            state.best_s,
+            state.gate_s,
         )
-        return Command(values, mode=state.mode, setpoint=log, giving_up=state.giving_up), state
+        return Command(values, state.mode, log, state.giving_up), after
 
 
 def _restarts(relative: RelativeState | None) -> int:

@@ -1,25 +1,17 @@
-"""Proprioception unpacked into plain floats: the controllers' arithmetic is scalar, which is faster than 3-vectors."""
+"""Proprioception unpacked once a period, for scalar code and for compiled code."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Proprioception
 
-__all__ = [
-    "Rows",
-    "Senses",
-    "Vector",
-    "cross",
-    "read_senses",
-    "rotate",
-    "rotate_back",
-    "rotation_zyx",
-    "rows_of",
-    "turn",
-]
+__all__ = ["Rows", "Senses", "Vector", "cross", "read_senses", "rotate", "rows_of"]
 
 Vector = tuple[float, float, float]
 Rows = tuple[float, float, float, float, float, float, float, float, float]
@@ -32,94 +24,108 @@ class Senses(NamedTuple):
     Attributes:
         time_s: time.
         depth_m: positive down.
-        roll_rad, pitch_rad, yaw_rad: Euler angles zyx of the body in the world; positive pitch is nose down.
-        rate_rad_s: p, q, r.
-        ground_m_s: velocity over ground, body axes.
-        water_m_s: velocity through the water, body axes.
+        yaw_rad: compass heading of the body, the last of the Euler angles zyx in the world; positive to port.
         contact: bow switch.
         latched: latch reported closed.
-        level: rotation from body axes to the level heading frame (ahead, port, up).
+        motion: (20,) what compiled code reads, never written to: roll and pitch (positive pitch is nose down) in rad;
+            p, q, r in rad/s; velocity over ground, then through the water, in m/s, body axes; from index 11 on the
+            rotation from body axes to the level heading frame (ahead, port, up), row by row.
     """
 
     time_s: float
     depth_m: float
-    roll_rad: float
-    pitch_rad: float
     yaw_rad: float
-    rate_rad_s: Vector
-    ground_m_s: Vector
-    water_m_s: Vector
     contact: bool
     latched: bool
-    level: Rows
+    motion: Array
+
+    @property
+    def roll_rad(self) -> float:
+        """Positive to starboard."""
+        return self.motion.item(0)
+
+    @property
+    def pitch_rad(self) -> float:
+        """Positive nose down."""
+        return self.motion.item(1)
+
+    @property
+    def rate_rad_s(self) -> Vector:
+        """p, q, r."""
+        p, q, r = self.motion[2:5].tolist()
+        return p, q, r
+
+    @property
+    def ground_m_s(self) -> Vector:
+        """Velocity over ground, body axes."""
+        x, y, z = self.motion[5:8].tolist()
+        return x, y, z
+
+    @property
+    def surge_water_m_s(self) -> float:
+        """Forward velocity through the water."""
+        return self.motion.item(8)
+
+    def level(self, heading_rad: float, vector: Vector) -> Vector:
+        """A vector of body axes in level axes against which the vehicle heads `heading_rad` to port: Rz R v."""
+        return _level(self.motion, heading_rad, vector[0], vector[1], vector[2])
 
 
 def read_senses(proprioception: Proprioception) -> Senses:
     """Unpack; a reading that is not finite counts as 0, so that no command ever becomes NaN."""
-    roll, pitch, yaw = _finite(proprioception.euler_zyx_rad.tolist())
     depth, time = proprioception.depth_m, proprioception.time_s
+    euler = proprioception.euler_zyx_rad
+    yaw = float(euler[2])
+    motion = _motion(
+        euler,
+        proprioception.angular_velocity_rad_s,
+        proprioception.velocity_ground_m_s,
+        proprioception.velocity_water_m_s,
+    )
     return Senses(
-        time_s=time if math.isfinite(time) else 0.0,
-        depth_m=depth if math.isfinite(depth) else 0.0,
-        roll_rad=roll,
-        pitch_rad=pitch,
-        yaw_rad=yaw,
-        rate_rad_s=_finite(proprioception.angular_velocity_rad_s.tolist()),
-        ground_m_s=_finite(proprioception.velocity_ground_m_s.tolist()),
-        water_m_s=_finite(proprioception.velocity_water_m_s.tolist()),
-        contact=proprioception.contact,
-        latched=proprioception.latched,
-        level=rotation_zyx(roll, pitch, 0.0),
+        time if math.isfinite(time) else 0.0,
+        depth if math.isfinite(depth) else 0.0,
+        yaw if math.isfinite(yaw) else 0.0,
+        proprioception.contact,
+        proprioception.latched,
+        motion,
     )
 
 
-def _finite(values: list[float]) -> Vector:
-    x, y, z = values
-    if math.isfinite(x + y + z):
-        return x, y, z
-    clean = [value if math.isfinite(value) else 0.0 for value in values]
-    return clean[0], clean[1], clean[2]
+@compiled
+def _motion(euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array) -> Array:
+    """`Senses.motion`; the rotation is Ry(pitch) Rx(roll), as `transforms.rotation_from_euler_zyx` without yaw."""
+    motion = np.empty(20)
+    motion[:2] = euler_rad[:2]
+    motion[2:5] = rate_rad_s
+    motion[5:8] = ground_m_s
+    motion[8:11] = water_m_s
+    for i in range(11):
+        if not math.isfinite(motion[i]):
+            motion[i] = 0.0
+    cr, sr = math.cos(motion[0]), math.sin(motion[0])
+    cp, sp = math.cos(motion[1]), math.sin(motion[1])
+    motion[11], motion[12], motion[13] = cp, sp * sr, sp * cr
+    motion[14], motion[15], motion[16] = 0.0, cr, -sr
+    motion[17], motion[18], motion[19] = -sp, cp * sr, cp * cr
+    return motion
+
+
+@compiled
+def _level(motion: Array, heading_rad: float, x: float, y: float, z: float) -> Vector:
+    """`Senses.level`, from `Senses.motion`."""
+    m, cosine, sine = motion[11:], math.cos(heading_rad), math.sin(heading_rad)
+    return (
+        (cosine * m[0] - sine * m[3]) * x + (cosine * m[1] - sine * m[4]) * y + (cosine * m[2] - sine * m[5]) * z,
+        (sine * m[0] + cosine * m[3]) * x + (sine * m[1] + cosine * m[4]) * y + (sine * m[2] + cosine * m[5]) * z,
+        m[6] * x + m[7] * y + m[8] * z,
+    )
 
 
 def rows_of(matrix: Array) -> Rows:
     """A (3, 3) array as plain rows."""
     a, b, c, d, e, f, g, h, i = matrix.ravel().tolist()
     return a, b, c, d, e, f, g, h, i
-
-
-def rotation_zyx(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Rows:
-    """Rz(yaw) Ry(pitch) Rx(roll), as `auvdock.core.transforms.rotation_from_euler_zyx`."""
-    cr, sr = math.cos(roll_rad), math.sin(roll_rad)
-    cp, sp = math.cos(pitch_rad), math.sin(pitch_rad)
-    cy, sy = math.cos(yaw_rad), math.sin(yaw_rad)
-    return (
-        cy * cp,
-        cy * sp * sr - sy * cr,
-        cy * sp * cr + sy * sr,
-        sy * cp,
-        sy * sp * sr + cy * cr,
-        sy * sp * cr - cy * sr,
-        -sp,
-        cp * sr,
-        cp * cr,
-    )
-
-
-def turn(level: Rows, yaw_rad: float) -> Rows:
-    """Rz(yaw) R: from a level heading frame to one that is turned by −yaw against it."""
-    a, b, c, d, e, f, g, h, i = level
-    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
-    return (
-        cosine * a - sine * d,
-        cosine * b - sine * e,
-        cosine * c - sine * f,
-        sine * a + cosine * d,
-        sine * b + cosine * e,
-        sine * c + cosine * f,
-        g,
-        h,
-        i,
-    )
 
 
 def rotate(rows: Rows, vector: Vector) -> Vector:
@@ -129,16 +135,6 @@ def rotate(rows: Rows, vector: Vector) -> Vector:
         rows[0] * x + rows[1] * y + rows[2] * z,
         rows[3] * x + rows[4] * y + rows[5] * z,
         rows[6] * x + rows[7] * y + rows[8] * z,
-    )
-
-
-def rotate_back(rows: Rows, vector: Vector) -> Vector:
-    """Rᵀ v."""
-    x, y, z = vector
-    return (
-        rows[0] * x + rows[3] * y + rows[6] * z,
-        rows[1] * x + rows[4] * y + rows[7] * z,
-        rows[2] * x + rows[5] * y + rows[8] * z,
     )
 
 

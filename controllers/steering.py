@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
-from auvdock.controllers.guidance import GuidanceCfg, approach_speed, crab_angle, ilos
-from auvdock.controllers.modes import ModeCfg
+from auvdock.controllers.guidance import GuidanceCfg, axis_course, crabbed
 from auvdock.controllers.senses import Senses, Vector
+from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 
 __all__ = [
@@ -234,50 +234,41 @@ def along_axis(
     hold: bool,
     committed: bool,
     lookahead_m: float,
-    funnel_length_m: float,
     senses: Senses,
     current_m_s: Vector,
-    reach_m_s: float,
-    guidance: GuidanceCfg,
-    modes: ModeCfg,
-    dt_s: float,
+    law: Array,
 ) -> Steering:
-    """Along the approach axis: integral line of sight sideways and vertically, hull aligned but for crab.
+    """Along the approach axis; see `guidance.axis_course`.
 
-    Cross-track speeds are U sin χ with χ from `guidance.ilos`; the forward speed is `guidance.approach_speed`, 0 while
-    `hold`. Crab fades from `max_crab_rad` at the mouth to `max_entry_crab_rad` at the throat. A cross-current beyond
-    the sway thrusters' reach raises the speed once `committed`: at more speed the same current needs less crab.
+    Args:
+        place: the nose before the mouth.
+        integrals: of the line of sight, port and up.
+        hold: wait at the gate.
+        committed: past the gate.
+        lookahead_m: of the line of sight.
+        senses: the vehicle's own.
+        current_m_s: in world axes.
+        law: from `guidance.axis_law`.
     """
-    port_angle, port_integral = ilos(place.port_m, integrals[0], lookahead_m, guidance.integral_gain, dt_s)
-    up_angle, up_integral = ilos(place.up_m, integrals[1], lookahead_m, guidance.integral_gain, dt_s)
-    # Integral action is for what is left on the axis: not for the way there, nor for what the funnel's walls do.
-    if place.distance_m < 0.0 or place.off_axis_m > guidance.corridor_m:
-        port_integral, up_integral = integrals
-    bound = guidance.max_cross_speed_m_s
-    port = _clip(guidance.cross_speed_m_s * math.sin(port_angle), bound)
-    up = _clip(guidance.cross_speed_m_s * math.sin(up_angle), bound)
-    forward = approach_speed(place.distance_m, place.off_axis_m, guidance)
-    if place.distance_m < modes.mouth_m:
-        past = place.distance_m < -funnel_length_m
-        forward = guidance.tube_speed_m_s if past else guidance.entry_speed_m_s
-    elif hold:
-        forward = _clip(0.3 * (place.distance_m - modes.gate_distance_m), 0.2)
-    across = abs(current_m_s[1] * math.cos(place.axis_yaw_rad) - current_m_s[0] * math.sin(place.axis_yaw_rad))
-    excess = min(1.0, max(0.0, (across - reach_m_s) / guidance.rush_excess_m_s))
-    if excess > 0.0 and committed:
-        forward += excess * (guidance.rush_speed_m_s - forward)
-    elif excess > 0.0 and not hold:  # without way on, the hull could not hold its place by crabbing
-        forward = max(forward, excess * guidance.min_way_m_s)
-    # The hull turns straight on its way through the funnel.
-    turning = guidance.straighten_rad_m * max(0.0, place.distance_m + guidance.straight_share * funnel_length_m)
-    limit = min(guidance.max_crab_rad, guidance.max_entry_crab_rad + turning)
-    bearing, view = 0.0, math.pi
-    if place.distance_m > 1.0:
-        bearing, view = math.atan2(-place.port_m, place.distance_m), guidance.max_view_angle_rad
-    setpoint, offset = ground_course(
-        forward, port, up, place.axis_yaw_rad, limit, senses, current_m_s, reach_m_s, (bearing - view, bearing + view)
+    distance, port, up, course, _ = place
+    turn = math.remainder(senses.yaw_rad - course, math.tau)
+    surge, sway, heave, offset, port_integral, up_integral = axis_course(
+        law,
+        distance,
+        port,
+        up,
+        place.off_axis_m,
+        course,
+        integrals[0],
+        integrals[1],
+        hold,
+        committed,
+        lookahead_m,
+        turn,
+        current_m_s[0],
+        current_m_s[1],
     )
-    return Steering(setpoint, port_integral, up_integral, offset)
+    return Steering(AutopilotSetpoint(surge, sway, heave, 0.0, course + offset), port_integral, up_integral, offset)
 
 
 def back_off(place: Place, senses: Senses, current_m_s: Vector, reach_m_s: float, cfg: GuidanceCfg) -> Steering:
@@ -307,17 +298,18 @@ def ground_course(
 
     The offset is the crab angle, kept within `view_rad` so that the lights stay in the image.
     """
-    cosine, sine = math.cos(course_rad), math.sin(course_rad)
-    along = current_m_s[0] * cosine + current_m_s[1] * sine
-    across = -current_m_s[0] * sine + current_m_s[1] * cosine
-    offset = 0.0
-    if crab_limit_rad > 0.0:
-        offset = crab_angle(forward_m_s - along, port_m_s - across, reach_m_s, crab_limit_rad)
-    offset = min(view_rad[1], max(view_rad[0], offset))
-    turn = math.remainder(senses.yaw_rad - course_rad, math.tau)
-    cosine, sine = math.cos(turn), math.sin(turn)
-    surge = forward_m_s * cosine + port_m_s * sine
-    sway = port_m_s * cosine - forward_m_s * sine
+    surge, sway, offset = crabbed(
+        forward_m_s,
+        port_m_s,
+        course_rad,
+        crab_limit_rad,
+        math.remainder(senses.yaw_rad - course_rad, math.tau),
+        current_m_s[0],
+        current_m_s[1],
+        reach_m_s,
+        view_rad[0],
+        view_rad[1],
+    )
     return AutopilotSetpoint(surge, sway, up_m_s, 0.0, course_rad + offset), offset
 
 

@@ -14,7 +14,7 @@ from auvdock.controllers.landing.modes import ABORT, DESCEND, DOCKED, SEARCH, TO
 from auvdock.controllers.landing.state import LandingState
 from auvdock.controllers.landing.steering import Demand, Situation, demand
 from auvdock.controllers.relative_state import RelativeFilter, RelativeState
-from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of, turn
+from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Bearing, Command, Percept, Proprioception
 from auvdock.core.landing_station import LandingStationCfg
@@ -119,10 +119,8 @@ class LandingPilot:
         if relative is None:
             relative = self._filter.start(pose, senses) if pose is not None else None
         else:
-            relative = self._filter.predict(relative, senses)
-            if pose is not None:
-                relative = self._filter.update_pose(relative, senses, pose)
-        east, north, _ = rotate(turn(senses.level, senses.yaw_rad), senses.ground_m_s)
+            relative = self._filter.advance(relative, senses, pose)
+        east, north, _ = senses.level(senses.yaw_rad, senses.ground_m_s)
         track = state.track_m[0] + east * self._dt_s, state.track_m[1] + north * self._dt_s
         # A perception that does not say how it fares is not lost: the age of its last pose decides alone.
         lost = percept.status == "lost" if isinstance(percept, LandingPercept) else percept is None and state.lost
@@ -155,7 +153,7 @@ class LandingPilot:
         x, y, z = bearing.ray_camera.tolist()
         if not math.isfinite(x + y + z):
             return None
-        east, north, up = rotate(turn(senses.level, senses.yaw_rad), rotate(self._R_body_camera, (x, y, z)))
+        east, north, up = senses.level(senses.yaw_rad, rotate(self._R_body_camera, (x, y, z)))
         height = self._platform_depth_m - senses.depth_m + self._camera_up_m
         if up > -0.3 or height < 0.1:
             return None
@@ -169,7 +167,7 @@ class LandingPilot:
         if relative is None:
             return None
         heading = math.remainder(senses.yaw_rad - relative.axis_yaw_rad, math.tau)
-        x, y, z = rotate(turn(senses.level, heading), self._camera_to_seat)
+        x, y, z = senses.level(heading, self._camera_to_seat)
         px, py, pz = relative.camera_m
         return Place(px + x, py + y, pz + z - self._seat_height_m, heading)
 
@@ -263,7 +261,7 @@ class LandingPilot:
         ahead, port = _turned((vx, vy), -senses.yaw_rad)
         point = AutopilotSetpoint(ahead, port, wanted.heave_m_s, 0.0, wanted.heading_rad)
         wrench, loops = self.autopilot.advance(state.autopilot, point, senses)
-        values, achieved = self.allocator.solve(wrench, senses.water_m_s[0], moments_first=True)
+        values, achieved = self.allocator.solve(wrench, senses.surge_water_m_s, moments_first=True)
         loops = self.autopilot.settle(loops, wrench, achieved)
         log = {
             "surge_m_s": ahead,

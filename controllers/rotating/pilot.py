@@ -19,7 +19,7 @@ from auvdock.controllers.rotating.modes import (
 )
 from auvdock.controllers.rotating.route import Leg, route
 from auvdock.controllers.rotating.steering import look_around, steer_course
-from auvdock.controllers.senses import Senses, Vector, cross, read_senses, rotate, turn
+from auvdock.controllers.senses import Senses, Vector, cross, read_senses
 from auvdock.controllers.steering import Place, Steering
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, AzimuthFix, Bearing, Command, Percept, Proprioception
@@ -163,7 +163,7 @@ class RotatingPilot:
         spin = cross(senses.rate_rad_s, self._lever)
         ground = senses.ground_m_s
         body = (ground[0] + spin[0], ground[1] + spin[1], ground[2] + spin[2])
-        east, north, _ = rotate(turn(senses.level, senses.yaw_rad), body)
+        east, north, _ = senses.level(senses.yaw_rad, body)
         last = state.trail[-1] if state.trail else Step(senses.time_s, senses.yaw_rad, 0.0, 0.0, senses.depth_m)
         now = Step(
             senses.time_s,

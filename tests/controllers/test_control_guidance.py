@@ -13,17 +13,20 @@ from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.guidance import (
     GuidanceCfg,
     approach_speed,
+    axis_law,
     corridor_m,
     crab_angle,
     ilos,
     sway_reach_m_s,
 )
 from auvdock.controllers.linear_model import hydrodynamic_wrench
+from auvdock.controllers.modes import ModeCfg
 from auvdock.controllers.steering import SearchCfg, search, search_pattern, sighted
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import load_vehicle
 
 CFG = GuidanceCfg()
+LAW = axis_law(CFG, ModeCfg(), 1.0, 0.35, 1.0 / 30.0)
 VEHICLE = load_vehicle("remus_hybrid")
 
 
@@ -66,11 +69,11 @@ def test_far_from_the_path_the_integral_hardly_grows():
 
 def test_speed_is_full_on_the_axis_and_falls_to_zero_off_it():
     for distance in (1.0, 3.0, 6.0, 12.0):
-        width = corridor_m(distance, CFG)
-        assert approach_speed(distance, 0.0, CFG) >= CFG.mid_speed_m_s
-        assert approach_speed(distance, 2.0 * width, CFG) == 0.0
-        assert approach_speed(distance, 1.5 * width, CFG) < approach_speed(distance, width, CFG)
-    assert approach_speed(30.0, 0.0, CFG) == CFG.far_speed_m_s
+        width = corridor_m(distance, LAW)
+        assert approach_speed(distance, 0.0, LAW) >= CFG.mid_speed_m_s
+        assert approach_speed(distance, 2.0 * width, LAW) == 0.0
+        assert approach_speed(distance, 1.5 * width, LAW) < approach_speed(distance, width, LAW)
+    assert approach_speed(30.0, 0.0, LAW) == CFG.far_speed_m_s
 
 
 @given(forward=st.floats(0.05, 1.5), port=st.floats(-1.0, 1.0), reach=st.floats(0.05, 0.6))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from auvdock.controllers.relative_state import _fused, _moved
+from auvdock.controllers.relative_update import _fused, _moved
 
 
 def spread(rng, size):

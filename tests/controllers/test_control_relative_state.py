@@ -15,7 +15,8 @@ from auvdock.core.contracts import PoseEstimate, Proprioception
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 
 CFG = FilterCfg()
-FILTER = RelativeFilter(CFG, CAMERA.T_body_camera, DT_S)
+TARGET = (-1.13, 0.0, 0.0)
+FILTER = RelativeFilter(CFG, CAMERA.T_body_camera, DT_S, target_m=TARGET)
 SIGMA = np.array([0.05, 0.05, 0.05, 0.02, 0.02, 0.02])
 AXIS_YAW = 0.7
 """Compass bearing of the station's x axis; a vehicle that flies straight in then heads AXIS_YAW + π."""
@@ -64,9 +65,9 @@ def run(seconds, poses=lambda step: True, rng=None, shift=lambda step: (0.0, 0.0
     track = Track(0.0)
     for step in range(1, round(seconds / DT_S)):
         track = Track(step * DT_S)
-        state = FILTER.predict(state, Track((step - 0.5) * DT_S).senses)
+        state = FILTER.advance(state, Track((step - 0.5) * DT_S).senses)
         if poses(step):
-            state = FILTER.update_pose(state, track.senses, track.pose(rng, shift(step)))
+            state = FILTER.update(state, track.senses, track.pose(rng, shift(step)))
     return state, track
 
 
@@ -113,16 +114,15 @@ def test_a_lasting_jump_starts_the_filter_anew():
 
 
 def test_bearing_of_the_entrance_corrects_a_sideways_error():
-    target = (-1.13, 0.0, 0.0)
     track = Track(19.0)
     start = FILTER.start(track.pose(), track.senses)
     assert start is not None
     x, y, z = start.camera_m
     state = start._replace(camera_m=(x, y + 0.2, z - 0.15), covariance=np.diag([0.04, 0.04, 0.04, 1e-4]))
-    ray = track.T_station_camera[:3, :3].T @ (np.array(target) - track.T_station_camera[:3, 3])
+    ray = track.T_station_camera[:3, :3].T @ (np.array(TARGET) - track.T_station_camera[:3, 3])
     ray /= np.linalg.norm(ray)
     for _ in range(40):
-        state = FILTER.update_bearing(state, track.senses, ray, target)
+        state = FILTER.update(state, track.senses, ray_camera=ray)
     truth = track.T_station_camera[:3, 3]
     assert abs(state.camera_m[1] - truth[1]) < 0.04
     assert abs(state.camera_m[2] - truth[2]) < 0.04
@@ -134,9 +134,9 @@ def test_updates_do_not_touch_their_arguments():
     state = FILTER.start(track.pose(), track.senses)
     assert state is not None
     before = copy.deepcopy(state)
-    FILTER.predict(state, track.senses)
-    FILTER.update_pose(state, track.senses, track.pose())
-    FILTER.update_bearing(state, track.senses, np.array([0.0, 0.0, 1.0]), (-1.0, 0.0, 0.0))
+    FILTER.advance(state, track.senses)
+    FILTER.update(state, track.senses, track.pose())
+    FILTER.update(state, track.senses, ray_camera=np.array([0.0, 0.0, 1.0]))
     np.testing.assert_array_equal(state.covariance, before.covariance)
     assert state[:2] == before[:2]
 
@@ -148,8 +148,8 @@ def test_nonsense_is_refused():
     assert FILTER.start(broken, track.senses) is None
     state = FILTER.start(pose, track.senses)
     assert state is not None
-    assert FILTER.update_pose(state, track.senses, broken) is state
-    assert FILTER.update_bearing(state, track.senses, np.full(3, np.nan), (-1.0, 0.0, 0.0)) is state
+    assert FILTER.update(state, track.senses, broken) is state
+    assert FILTER.update(state, track.senses, ray_camera=np.full(3, np.nan)) is state
     # Lying on its side, says the picture; upright, says the inclinometer.
     rolled = make_transform(track.rotation @ rotation_from_euler_zyx(0.8, 0.0, 0.0), track.body) @ CAMERA.T_body_camera
     assert FILTER.start(PoseEstimate(rolled, pose.covariance, (), "x", 0.0), track.senses) is None

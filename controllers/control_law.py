@@ -1,0 +1,186 @@
+"""The autopilot's arithmetic, compiled: speed references, feed-forward and the loops of all axes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
+
+__all__ = ["body_wrench", "pid_step"]
+
+# Places in the array of limits.
+_SURGE_ACCELERATION, _SWAY_ACCELERATION, _MAX_SPEED_ERROR, _INTEGRAL_ZONE, _NET_WEIGHT, _DT = 0, 1, 2, 3, 4, 5
+
+
+@compiled
+def body_wrench(
+    state: Array,
+    motion: Array,
+    yaw_rad: float,
+    surge_m_s: float,
+    sway_m_s: float,
+    heave_m_s: float,
+    through_water: bool,
+    pitch_error_rad: float,
+    heading_error_rad: float,
+    roll_error_rad: float,
+    turn_rad_s: float,
+    smoothing: float,
+    limits: Array,
+    loops: Array,
+    hull: Array,
+) -> Array:
+    """One period of the autopilot: τ = PID(error) + feed-forward for each axis.
+
+    Args:
+        state: (6 + n,) speed references in the level heading frame in m/s, smoothed current in world axes in m/s,
+            integrals of the n loops.
+        motion: (20,) `Senses.motion`.
+        yaw_rad: compass heading.
+        surge_m_s: wanted speed ahead, level heading frame.
+        sway_m_s: wanted speed to port.
+        heave_m_s: wanted speed upwards.
+        through_water: whether these speeds are through the water, not over ground.
+        pitch_error_rad: set-point minus measurement, bounded.
+        heading_error_rad: the same for heading.
+        roll_error_rad: the same for roll.
+        turn_rad_s: rate at which the heading set-point turns.
+        smoothing: weight of the current measured now.
+        limits: (6,) greatest change of the surge and of the sway and heave references in m/s², greatest distance of a
+            reference from the measured speed in m/s, errors beyond which an angle is not integrated in rad, weight less
+            buoyancy in N, period in s.
+        loops: (n, 5) row of the wrench, k_p, k_i, k_d, greatest output; surge, sway, heave, pitch, heading, and roll
+            where it is controlled.
+        hull: (22, 3) linear, quadratic and lift damping, six rows each, by the velocity's column; added mass of the
+            velocity, three rows; mass with added mass of surge, sway and heave.
+
+    Returns:
+        (12 + n,) wrench in body axes in N and N m, then the next state.
+    """
+    count = len(loops)
+    out = np.zeros(12 + count)
+    level, cosine, sine = motion[11:].reshape(3, 3), math.cos(yaw_rad), math.sin(yaw_rad)
+    world = np.empty((3, 3))
+    for i in range(3):
+        world[0, i] = cosine * level[0, i] - sine * level[1, i]
+        world[1, i] = sine * level[0, i] + cosine * level[1, i]
+        world[2, i] = level[2, i]
+    ground, water = motion[5:8], motion[8:11]
+    measured = water if through_water else ground
+    before, references, current = state[:3], out[6:9], out[9:12]
+    # Current: ground minus water velocity, smoothed.
+    flow = ground - water
+    for i in range(3):
+        now = world[i, 0] * flow[0] + world[i, 1] * flow[1] + world[i, 2] * flow[2]
+        current[i] = state[3 + i] + smoothing * (now - state[3 + i])
+    # References move towards the set-point at a bounded rate, not far from the measured speed.
+    dt_s = limits[_DT]
+    inertia = np.empty(3)
+    for i in range(3):
+        target = surge_m_s if i == 0 else sway_m_s if i == 1 else heave_m_s
+        bound = limits[_SURGE_ACCELERATION] if i == 0 else limits[_SWAY_ACCELERATION]
+        now = level[i, 0] * measured[0] + level[i, 1] * measured[1] + level[i, 2] * measured[2]
+        moved = before[i] + _clip(target - before[i], bound * dt_s)
+        references[i] = now + _clip(moved - now, limits[_MAX_SPEED_ERROR])
+        inertia[i] = hull[21, i] * _clip((references[i] - before[i]) / dt_s, bound)
+    wanted, drift, push, lift = _back(level, references), _back(world, current), _back(level, inertia), np.zeros(3)
+    lift[2] = limits[_NET_WEIGHT]
+    lift = _back(level, lift)
+    balance = _balance(wanted if through_water else wanted - drift, hull)
+    for axis in range(count):
+        row = int(loops[axis, 0])
+        feed, rate = balance[row], 0.0
+        if axis < 3:
+            error = wanted[axis] - measured[axis]
+            feed += lift[axis]
+            feed += push[axis]
+        elif axis == 3:
+            error, rate = pitch_error_rad, motion[3]
+        elif axis == 4:
+            error, rate = heading_error_rad, motion[4] - turn_rad_s
+        else:
+            error, rate = roll_error_rad, motion[2]
+        kp, ki, kd, limit = loops[axis, 1], loops[axis, 2], loops[axis, 3], loops[axis, 4]
+        integral = state[6 + axis]
+        output, after = pid_step(kp, ki, kd, integral, error, rate, feed, limit, dt_s)
+        out[row] = output
+        turning = axis >= 3 and abs(error) > limits[_INTEGRAL_ZONE]
+        out[12 + axis] = integral if turning else after
+    return out
+
+
+@compiled
+def pid_step(
+    kp: float,
+    ki: float,
+    kd: float,
+    integral: float,
+    error: float,
+    rate: float,
+    feed_forward: float,
+    limit: float,
+    dt_s: float,
+) -> tuple[float, float]:
+    """One step: τ = clip(k_p e + I + feed-forward − k_d ẏ, ± limit), İ = k_i e.
+
+    The derivative acts on the measured rate ẏ, so a step of the set-point gives no kick. Anti-windup is conditional
+    integration (Åström and Hägglund 2006, section 3.5): the integral stands still while the output is at its limit and
+    the error would drive it further, and it never exceeds the limit itself.
+
+    Args:
+        kp: k_p.
+        ki: k_i.
+        kd: k_d.
+        integral: integral part I so far, in the unit of the output.
+        error: set-point minus measurement.
+        rate: measured time derivative of the controlled quantity.
+        feed_forward: output known beforehand.
+        limit: greatest magnitude of the output.
+        dt_s: period.
+
+    Returns:
+        The output and the new integral.
+    """
+    candidate = _clip(integral + ki * error * dt_s, limit)
+    wanted = kp * error + candidate + feed_forward - kd * rate
+    if wanted > limit:
+        return limit, candidate if error < 0.0 else integral
+    if wanted < -limit:
+        return -limit, candidate if error > 0.0 else integral
+    return wanted, candidate
+
+
+@compiled
+def _balance(velocity: Array, hull: Array) -> Array:
+    """Wrench (6,) that balances drag, lift and Munk moment at a steady velocity through the water without rotation."""
+    wrench, momentum, speed = np.zeros(6), np.zeros(3), abs(velocity[0])
+    for row in range(6):
+        for column in range(3):
+            part = velocity[column]
+            drag = hull[row, column] + hull[6 + row, column] * abs(part) + hull[12 + row, column] * speed
+            wrench[row] -= drag * part
+    for row in range(3):
+        added = hull[18 + row]
+        momentum[row] = added[0] * velocity[0] + added[1] * velocity[1] + added[2] * velocity[2]
+    wrench[3] += velocity[1] * momentum[2] - velocity[2] * momentum[1]
+    wrench[4] += velocity[2] * momentum[0] - velocity[0] * momentum[2]
+    wrench[5] += velocity[0] * momentum[1] - velocity[1] * momentum[0]
+    return wrench
+
+
+@compiled
+def _back(rotation: Array, vector: Array) -> Array:
+    """Rᵀ v."""
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = rotation[0, i] * vector[0] + rotation[1, i] * vector[1] + rotation[2, i] * vector[2]
+    return out
+
+
+@compiled
+def _clip(value: float, bound: float) -> float:
+    """Within ± bound."""
+    return bound if value > bound else -bound if value < -bound else value

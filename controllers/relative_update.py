@@ -1,0 +1,304 @@
+"""The relative filter's arithmetic, compiled: dead reckoning, fusing a pose, fusing a bearing.
+
+Everything works on one array (6, 4), the sheet: rows 0 to 3 are the covariance P of (x, y, z, ψ_s), row 4 is the
+estimate itself, and row 5 begins with the verdicts on the pose and on the bearing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from auvdock.core.arrays import Array
+from auvdock.core.compiled import compiled
+
+__all__ = ["ACCEPTED", "LEFT_OUT", "REFUSED", "relative_period"]
+
+LEFT_OUT, ACCEPTED, REFUSED = 0.0, 1.0, 2.0
+"""Verdicts on a measurement: none came or it is not usable; fused; an outlier."""
+
+_TAU = math.tau
+_LEAST_AHEAD = 0.2
+"""A direction to a light must point ahead of the camera by so much: z of the unit ray."""
+
+
+@compiled
+def relative_period(
+    covariance: Array,
+    x: float,
+    y: float,
+    z: float,
+    axis_yaw_rad: float,
+    motion: Array,
+    yaw_rad: float,
+    dt_s: float,
+    mounting: Array,
+    process: Array,
+    pose: Array,
+    noise: Array,
+    floor: Array,
+    pose_limits: Array,
+    impatient: bool,
+    ray_x: float,
+    ray_y: float,
+    ray_z: float,
+    target_m: Array,
+    bearing_limits: Array,
+) -> Array:
+    """One period: dead reckoning, then a pose, then a bearing, as far as they came.
+
+    Args:
+        covariance: (4, 4) P.
+        x: of the camera in the station frame, m.
+        y: of the camera in the station frame, m.
+        z: of the camera in the station frame, m.
+        axis_yaw_rad: ψ_s.
+        motion: (20,) `Senses.motion`.
+        yaw_rad: compass heading.
+        dt_s: period; 0 to leave the dead reckoning out.
+        mounting: (4, 3) R_body_camera, and below it the camera on the body in m.
+        process: (4, 4) Q of one period.
+        pose: (4, 4) T_station_camera; NaN for none.
+        noise: (6, 6) its covariance.
+        floor: (6, 6) added to it.
+        pose_limits: (3,) factor on `noise`, gate, least trace of an acceptable rotation mismatch.
+        impatient: leave the bearing out if the pose is refused, as the filter then starts anew.
+        ray_x: x of the direction to the light, camera frame.
+        ray_y: y of the direction.
+        ray_z: z of the direction; 0 for none.
+        target_m: (3,) the light in the station frame.
+        bearing_limits: (4,) floor of the variance in rad², spread of the light in m, gate, least range in m.
+
+    Returns:
+        The sheet (6, 4).
+    """
+    sheet = np.zeros((6, 4))
+    sheet[:4] = covariance
+    sheet[4, 0], sheet[4, 1], sheet[4, 2], sheet[4, 3] = x, y, z, axis_yaw_rad
+    if dt_s > 0.0:
+        _reckon(sheet, motion, yaw_rad, dt_s, mounting, process)
+    sheet[5, 0] = _fuse_pose(sheet, motion, yaw_rad, mounting, pose, noise, floor, pose_limits)
+    if not (impatient and sheet[5, 0] == REFUSED):
+        sheet[5, 1] = _fuse_bearing(sheet, motion, yaw_rad, mounting, ray_x, ray_y, ray_z, target_m, bearing_limits)
+    return sheet
+
+
+@compiled
+def _reckon(sheet: Array, motion: Array, yaw_rad: float, dt_s: float, mounting: Array, process: Array) -> None:
+    """ṗ = R_station_body (v + ω × r_camera), P ← F P Fᵀ + Q."""
+    body, rate, lever = motion[5:8], motion[2:5], mounting[3]
+    ahead = body[0] + (rate[1] * lever[2] - rate[2] * lever[1])
+    port = body[1] + (rate[2] * lever[0] - rate[0] * lever[2])
+    up = body[2] + (rate[0] * lever[1] - rate[1] * lever[0])
+    turned = _station_body(motion, yaw_rad - sheet[4, 3])
+    velocity = np.empty(3)
+    for i in range(3):
+        velocity[i] = turned[i, 0] * ahead + turned[i, 1] * port + turned[i, 2] * up
+        sheet[4, i] += velocity[i] * dt_s
+    # A turn of the axis turns the velocity the other way: ∂v/∂ψ_s = −e_z × v.
+    sheet[:4] = _moved(sheet[:4], velocity[1] * dt_s, -velocity[0] * dt_s, process)
+
+
+@compiled
+def _fuse_pose(
+    sheet: Array,
+    motion: Array,
+    yaw_rad: float,
+    mounting: Array,
+    pose: Array,
+    noise: Array,
+    floor: Array,
+    limits: Array,
+) -> float:
+    """Fuse a measured pose, or refuse it as an outlier; the verdict.
+
+    The innovation is (p_measured − p, log(R_predictedᵀ R_measured)) with R = R_z(−ψ_s) R_world_body R_body_camera,
+    so ∂(rotation)/∂ψ_s = −Rᵀ e_z; tilt is known, which sharpens the position through the pose's own correlations.
+    """
+    if not math.isfinite(np.sum(pose * pose) + np.sum(noise * noise)):
+        return LEFT_OUT
+    predicted = _station_camera(motion, yaw_rad - sheet[4, 3], mounting)
+    e = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            e[i, j] = predicted[0, i] * pose[0, j] + predicted[1, i] * pose[1, j] + predicted[2, i] * pose[2, j]
+    if not e[0, 0] + e[1, 1] + e[2, 2] > limits[2]:
+        return REFUSED
+    innovation = np.empty(6)
+    for i in range(3):
+        innovation[i] = pose[i, 3] - sheet[4, i]
+    innovation[3] = 0.5 * (e[2, 1] - e[1, 2])
+    innovation[4] = 0.5 * (e[0, 2] - e[2, 0])
+    innovation[5] = 0.5 * (e[1, 0] - e[0, 1])
+    distance, shift, rest = _fused(sheet[:4], innovation, predicted[2], noise, limits[0], floor)
+    if not distance < limits[1]:
+        return REFUSED
+    sheet[:4] = rest
+    _shift(sheet, shift)
+    return ACCEPTED
+
+
+@compiled
+def _fuse_bearing(
+    sheet: Array,
+    motion: Array,
+    yaw_rad: float,
+    mounting: Array,
+    ray_x: float,
+    ray_y: float,
+    ray_z: float,
+    target_m: Array,
+    limits: Array,
+) -> float:
+    """Fuse the direction to a light at a known place: two scalar updates of d_x/d_z and d_y/d_z; the verdict.
+
+    d = Rᵀ (target − p) in the camera frame, with ∂d/∂p = −Rᵀ and ∂d/∂ψ_s = Rᵀ (e_z × (target − p)).
+    """
+    if not (math.isfinite(ray_x + ray_y + ray_z) and ray_z > _LEAST_AHEAD):
+        return LEFT_OUT
+    c = _station_camera(motion, yaw_rad - sheet[4, 3], mounting)
+    to_target = target_m - sheet[4, :3]
+    d = np.empty(3)
+    for i in range(3):
+        d[i] = c[0, i] * to_target[0] + c[1, i] * to_target[1] + c[2, i] * to_target[2]
+    if d[2] < limits[3]:
+        return LEFT_OUT
+    variance = limits[0] + (limits[1] / d[2]) ** 2
+    tx, ty = -to_target[1], to_target[0]  # e_z × (target − p)
+    rows, misses, spread = np.empty((2, 4)), np.empty(2), np.empty(4)
+    distance = 0.0
+    for n in range(2):
+        # Row of ∂(d_n/d_z)/∂(p, ψ_s).
+        ratio, measured = d[n] / d[2], (ray_x if n == 0 else ray_y) / ray_z
+        ax, ay = (c[0, n] - ratio * c[0, 2]) / d[2], (c[1, n] - ratio * c[1, 2]) / d[2]
+        rows[n, 0], rows[n, 1], rows[n, 2] = -ax, -ay, -(c[2, n] - ratio * c[2, 2]) / d[2]
+        rows[n, 3] = ax * tx + ay * ty
+        misses[n] = measured - ratio
+        _times(sheet, rows[n], spread)
+        distance += misses[n] * misses[n] / (_dot(rows[n], spread) + variance)
+    if distance > limits[2]:
+        return REFUSED
+    shift = np.zeros(4)
+    for n in range(2):
+        _times(sheet, rows[n], spread)
+        scale = 1.0 / (_dot(rows[n], spread) + variance)
+        step = scale * (misses[n] - _dot(rows[n], shift))
+        for i in range(4):
+            shift[i] += spread[i] * step
+            for j in range(4):
+                sheet[i, j] -= scale * spread[i] * spread[j]
+    _shift(sheet, shift)
+    return ACCEPTED
+
+
+@compiled
+def _shift(sheet: Array, shift: Array) -> None:
+    """Move the estimate; ψ_s stays within ±π."""
+    for i in range(3):
+        sheet[4, i] += shift[i]
+    axis_yaw = sheet[4, 3] + shift[3]
+    sheet[4, 3] = axis_yaw - _TAU * np.rint(axis_yaw / _TAU)
+
+
+@compiled
+def _station_body(motion: Array, heading_rad: float) -> Array:
+    """R_station_body (3, 3) of a body that heads `heading_rad` in the station frame."""
+    level, cosine, sine = motion[11:].reshape(3, 3), math.cos(heading_rad), math.sin(heading_rad)
+    turned = np.empty((3, 3))
+    for i in range(3):
+        turned[0, i] = cosine * level[0, i] - sine * level[1, i]
+        turned[1, i] = sine * level[0, i] + cosine * level[1, i]
+        turned[2, i] = level[2, i]
+    return turned
+
+
+@compiled
+def _station_camera(motion: Array, heading_rad: float, mounting: Array) -> Array:
+    """R_station_camera (3, 3) of a body that heads `heading_rad` in the station frame."""
+    body, camera = _station_body(motion, heading_rad), np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            camera[i, j] = body[i, 0] * mounting[0, j] + body[i, 1] * mounting[1, j] + body[i, 2] * mounting[2, j]
+    return camera
+
+
+@compiled
+def _dot(a: Array, b: Array) -> float:
+    """Of two (4,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+
+
+@compiled
+def _times(sheet: Array, vector: Array, out: Array) -> None:
+    """P times a vector (4,), into `out`."""
+    for i in range(4):
+        out[i] = _dot(sheet[i], vector)
+
+
+@compiled
+def _moved(covariance: Array, by_turn_x: float, by_turn_y: float, process: Array) -> Array:
+    """F P Fᵀ + Q (4, 4) with F = 1 but for what a turn of the axis does to x and y, F₀₃ and F₁₃."""
+    moved = covariance.copy()
+    moved[0] += by_turn_x * covariance[3]
+    moved[1] += by_turn_y * covariance[3]
+    turned = moved[:, 3].copy()
+    moved[:, 0] += by_turn_x * turned
+    moved[:, 1] += by_turn_y * turned
+    return moved + process
+
+
+@compiled
+def _fused(
+    covariance: Array, innovation: Array, turn: Array, noise: Array, inflation: float, floor: Array
+) -> tuple[float, Array, Array]:
+    """Kalman update of a covariance P (4, 4) by a pose.
+
+    With H = [1, 0; 0, -turn] the innovation (6,) has the covariance S = H P Hᵀ + inflation × noise + floor (6, 6).
+
+    Returns:
+        Its squared Mahalanobis distance, `inf` for a singular S; the state's shift (4,); (1 - K H) P (4, 4).
+    """
+    sensitivity = np.zeros((6, 4))
+    for i in range(3):
+        sensitivity[i, i] = 1.0
+        sensitivity[3 + i, 3] = -turn[i]
+    shared = np.zeros((6, 4))
+    for i in range(6):
+        for j in range(4):
+            for k in range(4):
+                shared[i, j] += sensitivity[i, k] * covariance[k, j]
+    # S = L Lᵀ, row by row; beside it L⁻¹ H P and L⁻¹ times the innovation.
+    lower, gain, white = np.zeros((6, 6)), shared.copy(), innovation.copy()
+    distance = 0.0
+    for i in range(6):
+        for j in range(i + 1):
+            value = inflation * noise[i, j] + floor[i, j]
+            for k in range(4):
+                value += shared[i, k] * sensitivity[j, k]
+            for k in range(j):
+                value -= lower[i, k] * lower[j, k]
+            if i > j:
+                lower[i, j] = value / lower[j, j]
+            elif value > 0.0:
+                lower[i, i] = math.sqrt(value)
+            else:
+                return np.inf, np.zeros(4), covariance
+        for k in range(i):
+            white[i] -= lower[i, k] * white[k]
+            for j in range(4):
+                gain[i, j] -= lower[i, k] * gain[k, j]
+        white[i] /= lower[i, i]
+        for j in range(4):
+            gain[i, j] /= lower[i, i]
+        distance += white[i] * white[i]
+    shift, rest = np.zeros(4), covariance.copy()
+    for i in range(4):
+        for k in range(6):
+            shift[i] += gain[k, i] * white[k]
+        for j in range(i + 1):
+            value = 0.5 * (covariance[i, j] + covariance[j, i])
+            for k in range(6):
+                value -= gain[k, i] * gain[k, j]
+            rest[i, j] = rest[j, i] = value
+    return distance, shift, rest
