@@ -103,7 +103,8 @@ class ThrustAllocator:
             moments_first: a group out of reach gives its moments in full and as much of its forces as is left, instead
                 of a share of both: a hull that cannot be held against a cross-current must still turn into it.
         """
-        check_shape("wrench_body", wrench_body, (6,))
+        if wrench_body.shape != (6,):
+            check_shape("wrench_body", wrench_body, (6,))
         effect = surge_m_s * abs(surge_m_s)
         given = _planar_groups(self._table, self._members, self._dead_band, wrench_body, effect)
         count = len(self._dead_band)

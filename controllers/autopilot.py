@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.controllers.control_law import body_wrench
+from auvdock.controllers.control_law import body_wrench, near
 from auvdock.controllers.gains import AutopilotGains, DesignCfg, design_gains
 from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.arrays import Array
@@ -91,15 +91,31 @@ class AutopilotSetpoint(NamedTuple):
 
 
 class AutopilotState(NamedTuple):
-    """Integrals (wrench units), shaped speed references (m/s) and smoothed current (m/s, world axes).
+    """What the loops remember.
 
-    Integrals come in the order surge, sway, heave, pitch, heading, and roll where it is controlled. `current_m_s` is
-    None before the first sample.
+    Attributes:
+        values: shaped speed references (ahead, to port, up, in m/s), smoothed current (world axes, in m/s), and the
+            integrals (wrench units) in the order surge, sway, heave, pitch, heading, and roll where it is controlled.
+        sampled: whether there was a sample yet; the current means nothing before.
     """
 
-    integrals: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)
-    references_m_s: Vector = (0.0, 0.0, 0.0)
-    current_m_s: Vector | None = None
+    values: tuple[float, ...]
+    sampled: bool = False
+
+    @property
+    def references_m_s(self) -> Vector:
+        """Shaped speed references in the level heading frame."""
+        return self.values[0], self.values[1], self.values[2]
+
+    @property
+    def current_m_s(self) -> Vector | None:
+        """Smoothed current in world axes, None before the first sample."""
+        return (self.values[3], self.values[4], self.values[5]) if self.sampled else None
+
+    @property
+    def integrals(self) -> tuple[float, ...]:
+        """Integral parts of the loops."""
+        return self.values[6:]
 
 
 class Autopilot:
@@ -119,7 +135,7 @@ class Autopilot:
             dt_s: control period.
         """
         self.gains: AutopilotGains = design_gains(vehicle, cfg.design, dt_s)
-        self._cfg = cfg
+        self._max_heave_m_s = cfg.max_heave_m_s
         self._dt_s = dt_s
         self._smoothing = 1.0 - math.exp(-dt_s / cfg.current_time_constant_s)
         names, rows = ("surge", "sway", "heave", "pitch", "heading", "roll"), (0, 1, 2, 4, 5, 3)
@@ -149,6 +165,7 @@ class Autopilot:
                 cfg.integral_zone_rad,
                 net_weight_n,
                 dt_s,
+                cfg.max_heading_error_rad,
             ]
         )
         mass = np.diag(vehicle.rigid_body_mass_body + vehicle.added_mass_body)
@@ -164,7 +181,7 @@ class Autopilot:
 
     def initial_state(self) -> AutopilotState:
         """At rest, integrals empty."""
-        return AutopilotState(integrals=(0.0,) * len(self._pids))
+        return AutopilotState((0.0,) * (6 + len(self._loops)))
 
     def step(
         self, state: AutopilotState, setpoint: AutopilotSetpoint, proprioception: Proprioception
@@ -176,45 +193,37 @@ class Autopilot:
         self, state: AutopilotState, setpoint: AutopilotSetpoint, senses: Senses
     ) -> tuple[Array, AutopilotState]:
         """As `step`, from unpacked senses."""
-        cfg = self._cfg
-        bound = cfg.max_heading_error_rad
         heave = setpoint.heave_m_s
         if setpoint.depth_m is not None:
-            heave = _clip(self._depth_gain * (senses.depth_m - setpoint.depth_m), cfg.max_heave_m_s)
-        # The first sample of the current counts in full.
-        current = state.current_m_s
-        smoothing, current = (self._smoothing, current) if current is not None else (1.0, (0.0, 0.0, 0.0))
+            bound = self._max_heave_m_s
+            heave = min(bound, max(-bound, self._depth_gain * (senses.depth_m - setpoint.depth_m)))
         out = body_wrench(
-            np.array((*state.references_m_s, *current, *state.integrals)),
+            state.values,
             senses.motion,
             senses.yaw_rad,
             setpoint.surge_m_s,
             setpoint.sway_m_s,
             heave,
             setpoint.through_water,
-            _clip(math.remainder(setpoint.pitch_rad - senses.pitch_rad, math.tau), bound),
-            _clip(math.remainder(setpoint.heading_rad - senses.yaw_rad, math.tau), bound),
-            _clip(setpoint.roll_rad - senses.roll_rad, bound),
+            setpoint.pitch_rad,
+            setpoint.heading_rad,
+            setpoint.roll_rad,
             setpoint.turn_rad_s,
-            smoothing,
+            # The first sample of the current counts in full.
+            self._smoothing if state.sampled else 1.0,
             self._law,
             self._loops,
             self._hull,
         )
-        ahead, port, up, x, y, z, *integrals = out[6:].tolist()
-        return out[:6], AutopilotState(tuple(integrals), (ahead, port, up), (x, y, z))
+        return out[:6], AutopilotState(tuple(out[6:].tolist()), True)
 
     def settle(self, state: AutopilotState, wanted: Array, achieved: Array) -> AutopilotState:
         """Anti-windup for what allocation could not give: İ = (τ_achieved − τ_wanted) k_i/k_p (back-calculation)."""
-        missing: list[float] = (achieved - wanted).tolist()
-        if max(missing) < 1e-6 and min(missing) > -1e-6:
+        if near(wanted, achieved):
             return state
+        missing: list[float] = (achieved - wanted).tolist()
         corrected = [
             integral + self._dt_s * missing[row] * gains.ki / max(gains.kp, 1e-9)
             for integral, row, gains in zip(state.integrals, self._rows, self._pids, strict=True)
         ]
-        return AutopilotState(tuple(corrected), state.references_m_s, state.current_m_s)
-
-
-def _clip(value: float, bound: float) -> float:
-    return bound if value > bound else -bound if value < -bound else value
+        return AutopilotState((*state.values[:6], *corrected), state.sampled)

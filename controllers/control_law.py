@@ -9,24 +9,32 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.compiled import compiled
 
-__all__ = ["body_wrench", "pid_step"]
+__all__ = ["body_wrench", "near", "pid_step"]
 
 # Places in the array of limits.
-_SURGE_ACCELERATION, _SWAY_ACCELERATION, _MAX_SPEED_ERROR, _INTEGRAL_ZONE, _NET_WEIGHT, _DT = 0, 1, 2, 3, 4, 5
+_SURGE_ACCELERATION, _SWAY_ACCELERATION, _MAX_SPEED_ERROR, _INTEGRAL_ZONE, _NET_WEIGHT, _DT, _MAX_ERROR = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+)
 
 
 @compiled
 def body_wrench(
-    state: Array,
+    state: tuple[float, ...],
     motion: Array,
     yaw_rad: float,
     surge_m_s: float,
     sway_m_s: float,
     heave_m_s: float,
     through_water: bool,
-    pitch_error_rad: float,
-    heading_error_rad: float,
-    roll_error_rad: float,
+    pitch_rad: float,
+    heading_rad: float,
+    roll_rad: float,
     turn_rad_s: float,
     smoothing: float,
     limits: Array,
@@ -44,14 +52,14 @@ def body_wrench(
         sway_m_s: wanted speed to port.
         heave_m_s: wanted speed upwards.
         through_water: whether these speeds are through the water, not over ground.
-        pitch_error_rad: set-point minus measurement, bounded.
-        heading_error_rad: the same for heading.
-        roll_error_rad: the same for roll.
+        pitch_rad: set-point of the pitch.
+        heading_rad: set-point of the heading.
+        roll_rad: set-point of the roll.
         turn_rad_s: rate at which the heading set-point turns.
         smoothing: weight of the current measured now.
-        limits: (6,) greatest change of the surge and of the sway and heave references in m/s², greatest distance of a
+        limits: (7,) greatest change of the surge and of the sway and heave references in m/s², greatest distance of a
             reference from the measured speed in m/s, errors beyond which an angle is not integrated in rad, weight less
-            buoyancy in N, period in s.
+            buoyancy in N, period in s, greatest error of an angle that counts in rad.
         loops: (n, 5) row of the wrench, k_p, k_i, k_d, greatest output; surge, sway, heave, pitch, heading, and roll
             where it is controlled.
         hull: (22, 3) linear, quadratic and lift damping, six rows each, by the velocity's column; added mass of the
@@ -70,7 +78,7 @@ def body_wrench(
         world[2, i] = level[2, i]
     ground, water = motion[5:8], motion[8:11]
     measured = water if through_water else ground
-    before, references, current = state[:3], out[6:9], out[9:12]
+    references, current = out[6:9], out[9:12]
     # Current: ground minus water velocity, smoothed.
     flow = ground - water
     for i in range(3):
@@ -83,9 +91,9 @@ def body_wrench(
         target = surge_m_s if i == 0 else sway_m_s if i == 1 else heave_m_s
         bound = limits[_SURGE_ACCELERATION] if i == 0 else limits[_SWAY_ACCELERATION]
         now = level[i, 0] * measured[0] + level[i, 1] * measured[1] + level[i, 2] * measured[2]
-        moved = before[i] + _clip(target - before[i], bound * dt_s)
+        moved = state[i] + _clip(target - state[i], bound * dt_s)
         references[i] = now + _clip(moved - now, limits[_MAX_SPEED_ERROR])
-        inertia[i] = hull[21, i] * _clip((references[i] - before[i]) / dt_s, bound)
+        inertia[i] = hull[21, i] * _clip((references[i] - state[i]) / dt_s, bound)
     wanted, drift, push, lift = _back(level, references), _back(world, current), _back(level, inertia), np.zeros(3)
     lift[2] = limits[_NET_WEIGHT]
     lift = _back(level, lift)
@@ -98,11 +106,12 @@ def body_wrench(
             feed += lift[axis]
             feed += push[axis]
         elif axis == 3:
-            error, rate = pitch_error_rad, motion[3]
+            error, rate = _clip(_within_pi(pitch_rad - motion[1]), limits[_MAX_ERROR]), motion[3]
         elif axis == 4:
-            error, rate = heading_error_rad, motion[4] - turn_rad_s
+            error = _clip(_within_pi(heading_rad - yaw_rad), limits[_MAX_ERROR])
+            rate = motion[4] - turn_rad_s
         else:
-            error, rate = roll_error_rad, motion[2]
+            error, rate = _clip(roll_rad - motion[0], limits[_MAX_ERROR]), motion[2]
         kp, ki, kd, limit = loops[axis, 1], loops[axis, 2], loops[axis, 3], loops[axis, 4]
         integral = state[6 + axis]
         output, after = pid_step(kp, ki, kd, integral, error, rate, feed, limit, dt_s)
@@ -110,6 +119,15 @@ def body_wrench(
         turning = axis >= 3 and abs(error) > limits[_INTEGRAL_ZONE]
         out[12 + axis] = integral if turning else after
     return out
+
+
+@compiled
+def near(wanted: Array, achieved: Array) -> bool:
+    """Whether two wrenches (6,) are the same to 1e-6 N and N m."""
+    for i in range(6):
+        if not -1e-6 < achieved[i] - wanted[i] < 1e-6:
+            return False
+    return True
 
 
 @compiled
@@ -184,3 +202,9 @@ def _back(rotation: Array, vector: Array) -> Array:
 def _clip(value: float, bound: float) -> float:
     """Within ± bound."""
     return bound if value > bound else -bound if value < -bound else value
+
+
+@compiled
+def _within_pi(angle: float) -> float:
+    """An angle brought to within ±π."""
+    return angle - math.tau * np.rint(angle / math.tau)

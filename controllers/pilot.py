@@ -25,7 +25,7 @@ from auvdock.controllers.modes import (
 )
 from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
 from auvdock.controllers.rotating.config import RotatingControlCfg
-from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of
+from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.controllers.steering import (
     Place,
     SearchCfg,
@@ -139,7 +139,7 @@ class ConicalPilot:
         self.cfg = cfg
         self.autopilot = Autopilot(vehicle, cfg.autopilot, dt_s)
         self.allocator = ThrustAllocator(vehicle, cfg.allocation)
-        self._R_body_camera = rows_of(camera.T_body_camera[:3, :3])
+        self._R_body_camera = np.ascontiguousarray(camera.T_body_camera[:3, :3])
         lever = camera.T_body_camera[:3, 3]
         self._camera_to_nose: Vector = (vehicle.nose_x_m - float(lever[0]), -float(lever[1]), -float(lever[2]))
         layout = station.layout
@@ -248,8 +248,7 @@ class ConicalPilot:
 
     def compass_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
         """Compass azimuth, positive to port, and elevation of a bearing in rad."""
-        x, y, z = bearing.ray_camera.tolist()
-        east, north, up = senses.level(senses.yaw_rad, rotate(self._R_body_camera, (x, y, z)))
+        east, north, up = senses.level_ray(senses.yaw_rad, self._R_body_camera, bearing.ray_camera)
         return math.atan2(north, east), math.atan2(up, math.hypot(east, north))
 
     def place(self, relative: RelativeState, senses: Senses) -> Place:

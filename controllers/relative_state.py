@@ -22,7 +22,7 @@ from auvdock.core.errors import ConfigError
 __all__ = ["FilterCfg", "RelativeFilter", "RelativeState"]
 
 _NO_POSE, _NO_NOISE = np.full((4, 4), math.nan), np.zeros((6, 6))
-_NO_RAY = (0.0, 0.0, 0.0)
+_NO_RAY = np.zeros(3)
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class RelativeState(NamedTuple):
     @property
     def cross_track_sigma_m(self) -> float:
         """Standard deviation across the axis, the worse of sideways and vertical."""
-        return math.sqrt(max(float(self.covariance[1, 1]), float(self.covariance[2, 2]), 0.0))
+        return math.sqrt(max(self.covariance.item(5), self.covariance.item(10), 0.0))
 
 
 class RelativeFilter:
@@ -114,16 +114,13 @@ class RelativeFilter:
         self._front = front
         self._dt_s = dt_s
         self._R_body_camera = np.ascontiguousarray(T_body_camera[:3, :3])
-        self._mounting = np.vstack([self._R_body_camera, T_body_camera[:3, 3]])
+        self._mounting = np.vstack([self._R_body_camera, T_body_camera[:3, 3], target_m]).astype(np.float64)
+        self._floor = np.array([cfg.position_floor_m**2] * 3 + [cfg.rotation_floor_rad**2] * 3)
         walk, turn = cfg.position_walk_m_rs**2 * dt_s, cfg.heading_walk_rad_rs**2 * dt_s
-        self._process = np.diag([walk, walk, walk, turn])
-        self._floor = np.diag([cfg.position_floor_m**2] * 3 + [cfg.rotation_floor_rad**2] * 3)
         least_trace = 1.0 + 2.0 * math.cos(cfg.max_rotation_mismatch_rad)
-        self._pose_limits = np.array([cfg.inflation, cfg.gate, least_trace])
-        self._bearing_limits = np.array(
-            [cfg.bearing_floor_rad**2, cfg.entrance_spread_m, cfg.bearing_gate, cfg.min_bearing_range_m]
-        )
-        self._target_m = np.array(target_m, dtype=np.float64)
+        of_pose = [*self._floor.tolist(), cfg.inflation, cfg.gate, least_trace]
+        of_bearing = [cfg.bearing_floor_rad**2, cfg.entrance_spread_m, cfg.bearing_gate, cfg.min_bearing_range_m]
+        self._law = np.array([walk, walk, walk, turn, *of_pose, *of_bearing])
 
     def advance(
         self, state: RelativeState, senses: Senses, pose: PoseEstimate | None = None, ray_camera: Array | None = None
@@ -150,7 +147,6 @@ class RelativeFilter:
     ) -> RelativeState:
         x, y, z = state.camera_m
         T, cov = (pose.T_station_camera, pose.covariance) if pose is not None else (_NO_POSE, _NO_NOISE)
-        rx, ry, rz = ray_camera.tolist() if ray_camera is not None else _NO_RAY
         impatient = state.refused + 1 >= self._cfg.restart_after
         sheet = relative_period(
             state.covariance,
@@ -162,17 +158,11 @@ class RelativeFilter:
             senses.yaw_rad,
             dt_s,
             self._mounting,
-            self._process,
+            self._law,
             T,
             cov,
-            self._floor,
-            self._pose_limits,
             impatient,
-            rx,
-            ry,
-            rz,
-            self._target_m,
-            self._bearing_limits,
+            ray_camera if ray_camera is not None else _NO_RAY,
         )
         (x, y, z, axis_yaw_rad), (of_pose, of_bearing, _, _) = sheet[4:].tolist()
         if dt_s == 0.0 and of_pose == LEFT_OUT and of_bearing != ACCEPTED:
@@ -202,7 +192,7 @@ class RelativeFilter:
         if abs(pitch - senses.pitch_rad) > limit or abs(roll - senses.roll_rad) > limit or front < 0.0:
             return None
         yaw = math.atan2(float(R_station_body[1, 0]), float(R_station_body[0, 0]))
-        noise = self._cfg.inflation * cov + self._floor
+        noise = self._cfg.inflation * cov + np.diag(self._floor)
         # A small rotation ρ in the camera frame turns the estimate of ψ_s by −(Rᵀ e_z) · ρ.
         select = np.zeros((4, 6))
         select[:3, :3] = np.eye(3)

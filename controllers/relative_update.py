@@ -34,17 +34,11 @@ def relative_period(
     yaw_rad: float,
     dt_s: float,
     mounting: Array,
-    process: Array,
+    law: Array,
     pose: Array,
     noise: Array,
-    floor: Array,
-    pose_limits: Array,
     impatient: bool,
-    ray_x: float,
-    ray_y: float,
-    ray_z: float,
-    target_m: Array,
-    bearing_limits: Array,
+    ray: Array,
 ) -> Array:
     """One period: dead reckoning, then a pose, then a bearing, as far as they came.
 
@@ -57,18 +51,14 @@ def relative_period(
         motion: (20,) `Senses.motion`.
         yaw_rad: compass heading.
         dt_s: period; 0 to leave the dead reckoning out.
-        mounting: (4, 3) R_body_camera, and below it the camera on the body in m.
-        process: (4, 4) Q of one period.
+        mounting: (5, 3) R_body_camera, the camera on the body in m, the light of the bearing in the station frame in m.
+        law: (17,) diagonal of Q; what is added to the diagonal of a pose's covariance, the factor on that covariance,
+            the gate, the least trace of an acceptable rotation mismatch; of a bearing the floor of the variance in
+            rad², the spread of the light in m, the gate, the least range in m.
         pose: (4, 4) T_station_camera; NaN for none.
         noise: (6, 6) its covariance.
-        floor: (6, 6) added to it.
-        pose_limits: (3,) factor on `noise`, gate, least trace of an acceptable rotation mismatch.
         impatient: leave the bearing out if the pose is refused, as the filter then starts anew.
-        ray_x: x of the direction to the light, camera frame.
-        ray_y: y of the direction.
-        ray_z: z of the direction; 0 for none.
-        target_m: (3,) the light in the station frame.
-        bearing_limits: (4,) floor of the variance in rad², spread of the light in m, gate, least range in m.
+        ray: (3,) unit direction to the light in the camera frame; 0 for none.
 
     Returns:
         The sheet (6, 4).
@@ -77,10 +67,10 @@ def relative_period(
     sheet[:4] = covariance
     sheet[4, 0], sheet[4, 1], sheet[4, 2], sheet[4, 3] = x, y, z, axis_yaw_rad
     if dt_s > 0.0:
-        _reckon(sheet, motion, yaw_rad, dt_s, mounting, process)
-    sheet[5, 0] = _fuse_pose(sheet, motion, yaw_rad, mounting, pose, noise, floor, pose_limits)
+        _reckon(sheet, motion, yaw_rad, dt_s, mounting, law[:4])
+    sheet[5, 0] = _fuse_pose(sheet, motion, yaw_rad, mounting, pose, noise, law[4:13])
     if not (impatient and sheet[5, 0] == REFUSED):
-        sheet[5, 1] = _fuse_bearing(sheet, motion, yaw_rad, mounting, ray_x, ray_y, ray_z, target_m, bearing_limits)
+        sheet[5, 1] = _fuse_bearing(sheet, motion, yaw_rad, mounting, ray, law[13:])
     return sheet
 
 
@@ -108,22 +98,21 @@ def _fuse_pose(
     mounting: Array,
     pose: Array,
     noise: Array,
-    floor: Array,
-    limits: Array,
+    law: Array,
 ) -> float:
     """Fuse a measured pose, or refuse it as an outlier; the verdict.
 
     The innovation is (p_measured − p, log(R_predictedᵀ R_measured)) with R = R_z(−ψ_s) R_world_body R_body_camera,
     so ∂(rotation)/∂ψ_s = −Rᵀ e_z; tilt is known, which sharpens the position through the pose's own correlations.
     """
-    if not math.isfinite(np.sum(pose * pose) + np.sum(noise * noise)):
+    if not (_is_finite(pose) and _is_finite(noise)):
         return LEFT_OUT
     predicted = _station_camera(motion, yaw_rad - sheet[4, 3], mounting)
     e = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
             e[i, j] = predicted[0, i] * pose[0, j] + predicted[1, i] * pose[1, j] + predicted[2, i] * pose[2, j]
-    if not e[0, 0] + e[1, 1] + e[2, 2] > limits[2]:
+    if not e[0, 0] + e[1, 1] + e[2, 2] > law[8]:
         return REFUSED
     innovation = np.empty(6)
     for i in range(3):
@@ -131,8 +120,8 @@ def _fuse_pose(
     innovation[3] = 0.5 * (e[2, 1] - e[1, 2])
     innovation[4] = 0.5 * (e[0, 2] - e[2, 0])
     innovation[5] = 0.5 * (e[1, 0] - e[0, 1])
-    distance, shift, rest = _fused(sheet[:4], innovation, predicted[2], noise, limits[0], floor)
-    if not distance < limits[1]:
+    distance, shift, rest = _fused(sheet[:4], innovation, predicted[2], noise, law[6], law[:6])
+    if not distance < law[7]:
         return REFUSED
     sheet[:4] = rest
     _shift(sheet, shift)
@@ -145,39 +134,36 @@ def _fuse_bearing(
     motion: Array,
     yaw_rad: float,
     mounting: Array,
-    ray_x: float,
-    ray_y: float,
-    ray_z: float,
-    target_m: Array,
-    limits: Array,
+    ray: Array,
+    law: Array,
 ) -> float:
     """Fuse the direction to a light at a known place: two scalar updates of d_x/d_z and d_y/d_z; the verdict.
 
     d = Rᵀ (target − p) in the camera frame, with ∂d/∂p = −Rᵀ and ∂d/∂ψ_s = Rᵀ (e_z × (target − p)).
     """
-    if not (math.isfinite(ray_x + ray_y + ray_z) and ray_z > _LEAST_AHEAD):
+    if not (math.isfinite(ray[0] + ray[1] + ray[2]) and ray[2] > _LEAST_AHEAD):
         return LEFT_OUT
     c = _station_camera(motion, yaw_rad - sheet[4, 3], mounting)
-    to_target = target_m - sheet[4, :3]
+    to_target = mounting[4] - sheet[4, :3]
     d = np.empty(3)
     for i in range(3):
         d[i] = c[0, i] * to_target[0] + c[1, i] * to_target[1] + c[2, i] * to_target[2]
-    if d[2] < limits[3]:
+    if d[2] < law[3]:
         return LEFT_OUT
-    variance = limits[0] + (limits[1] / d[2]) ** 2
+    variance = law[0] + (law[1] / d[2]) ** 2
     tx, ty = -to_target[1], to_target[0]  # e_z × (target − p)
     rows, misses, spread = np.empty((2, 4)), np.empty(2), np.empty(4)
     distance = 0.0
     for n in range(2):
         # Row of ∂(d_n/d_z)/∂(p, ψ_s).
-        ratio, measured = d[n] / d[2], (ray_x if n == 0 else ray_y) / ray_z
+        ratio, measured = d[n] / d[2], ray[n] / ray[2]
         ax, ay = (c[0, n] - ratio * c[0, 2]) / d[2], (c[1, n] - ratio * c[1, 2]) / d[2]
         rows[n, 0], rows[n, 1], rows[n, 2] = -ax, -ay, -(c[2, n] - ratio * c[2, 2]) / d[2]
         rows[n, 3] = ax * tx + ay * ty
         misses[n] = measured - ratio
         _times(sheet, rows[n], spread)
         distance += misses[n] * misses[n] / (_dot(rows[n], spread) + variance)
-    if distance > limits[2]:
+    if distance > law[2]:
         return REFUSED
     shift = np.zeros(4)
     for n in range(2):
@@ -224,6 +210,16 @@ def _station_camera(motion: Array, heading_rad: float, mounting: Array) -> Array
 
 
 @compiled
+def _is_finite(matrix: Array) -> bool:
+    """Whether all squares of a matrix are finite in sum."""
+    total = 0.0
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            total += matrix[i, j] * matrix[i, j]
+    return math.isfinite(total)
+
+
+@compiled
 def _dot(a: Array, b: Array) -> float:
     """Of two (4,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
@@ -238,14 +234,17 @@ def _times(sheet: Array, vector: Array, out: Array) -> None:
 
 @compiled
 def _moved(covariance: Array, by_turn_x: float, by_turn_y: float, process: Array) -> Array:
-    """F P Fᵀ + Q (4, 4) with F = 1 but for what a turn of the axis does to x and y, F₀₃ and F₁₃."""
+    """F P Fᵀ + diag(process) (4, 4) with F = 1 but for what a turn of the axis does to x and y, F₀₃ and F₁₃."""
     moved = covariance.copy()
-    moved[0] += by_turn_x * covariance[3]
-    moved[1] += by_turn_y * covariance[3]
-    turned = moved[:, 3].copy()
-    moved[:, 0] += by_turn_x * turned
-    moved[:, 1] += by_turn_y * turned
-    return moved + process
+    for j in range(4):
+        moved[0, j] += by_turn_x * covariance[3, j]
+        moved[1, j] += by_turn_y * covariance[3, j]
+    for i in range(4):
+        turned = moved[i, 3]
+        moved[i, 0] += by_turn_x * turned
+        moved[i, 1] += by_turn_y * turned
+        moved[i, i] += process[i]
+    return moved
 
 
 @compiled
@@ -254,7 +253,7 @@ def _fused(
 ) -> tuple[float, Array, Array]:
     """Kalman update of a covariance P (4, 4) by a pose.
 
-    With H = [1, 0; 0, -turn] the innovation (6,) has the covariance S = H P Hᵀ + inflation × noise + floor (6, 6).
+    With H = [1, 0; 0, -turn] the innovation (6,) has the covariance S = H P Hᵀ + inflation noise + diag(floor) (6, 6).
 
     Returns:
         Its squared Mahalanobis distance, `inf` for a singular S; the state's shift (4,); (1 - K H) P (4, 4).
@@ -273,7 +272,9 @@ def _fused(
     distance = 0.0
     for i in range(6):
         for j in range(i + 1):
-            value = inflation * noise[i, j] + floor[i, j]
+            value = inflation * noise[i, j]
+            if i == j:
+                value += floor[i]
             for k in range(4):
                 value += shared[i, k] * sensitivity[j, k]
             for k in range(j):

@@ -11,11 +11,9 @@ from auvdock.core.arrays import Array
 from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Proprioception
 
-__all__ = ["Rows", "Senses", "Vector", "cross", "read_senses", "rotate", "rows_of"]
+__all__ = ["Senses", "Vector", "cross", "read_senses"]
 
 Vector = tuple[float, float, float]
-Rows = tuple[float, float, float, float, float, float, float, float, float]
-"""A (3, 3) matrix, row by row."""
 
 
 class Senses(NamedTuple):
@@ -70,6 +68,10 @@ class Senses(NamedTuple):
         """A vector of body axes in level axes against which the vehicle heads `heading_rad` to port: Rz R v."""
         return _level(self.motion, heading_rad, vector[0], vector[1], vector[2])
 
+    def level_ray(self, heading_rad: float, R_body_camera: Array, ray_camera: Array) -> Vector:
+        """As `level` for a direction (3,) in the frame of a camera whose mounting is R_body_camera (3, 3)."""
+        return _level_ray(self.motion, heading_rad, R_body_camera, ray_camera)
+
 
 def read_senses(proprioception: Proprioception) -> Senses:
     """Unpack; a reading that is not finite counts as 0, so that no command ever becomes NaN."""
@@ -122,19 +124,16 @@ def _level(motion: Array, heading_rad: float, x: float, y: float, z: float) -> V
     )
 
 
-def rows_of(matrix: Array) -> Rows:
-    """A (3, 3) array as plain rows."""
-    a, b, c, d, e, f, g, h, i = matrix.ravel().tolist()
-    return a, b, c, d, e, f, g, h, i
-
-
-def rotate(rows: Rows, vector: Vector) -> Vector:
-    """R v."""
-    x, y, z = vector
-    return (
-        rows[0] * x + rows[1] * y + rows[2] * z,
-        rows[3] * x + rows[4] * y + rows[5] * z,
-        rows[6] * x + rows[7] * y + rows[8] * z,
+@compiled
+def _level_ray(motion: Array, heading_rad: float, R_body_camera: Array, ray_camera: Array) -> Vector:
+    """`Senses.level_ray`, from `Senses.motion`."""
+    R, (x, y, z) = R_body_camera, (ray_camera[0], ray_camera[1], ray_camera[2])
+    return _level(
+        motion,
+        heading_rad,
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
     )
 
 

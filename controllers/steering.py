@@ -91,24 +91,20 @@ def sighted(
     """
     if last is None or time_s - last.time_s > 3.0:
         return Sight(1, time_s, azimuth_rad, elevation_rad, range_m)
-    looks = last.looks + 1
-    weight = max(smoothing, 1.0 / looks)
-    azimuth = last.azimuth_rad + weight * math.remainder(azimuth_rad - last.azimuth_rad, math.tau)
-    if range_m is None:
-        ranged = last.range_m
-    else:
-        ranged = (
-            range_m
-            if last.range_m is None
-            else last.range_m + max(0.25 * smoothing, 1.0 / looks) * (range_m - last.range_m)
-        )
+    frames, _, azimuth, elevation, ranged, widest, looks = last
+    looks += 1
+    share = 1.0 / looks
+    weight = max(smoothing, share)
+    azimuth += weight * math.remainder(azimuth_rad - azimuth, math.tau)
+    if range_m is not None:
+        ranged = range_m if ranged is None else ranged + max(0.25 * smoothing, share) * (range_m - ranged)
     return Sight(
-        last.frames + 1,
+        frames + 1,
         time_s,
         math.remainder(azimuth, math.tau),
-        last.elevation_rad + weight * (elevation_rad - last.elevation_rad),
+        elevation + weight * (elevation_rad - elevation),
         ranged,
-        max(last.widest_m, ranged or 0.0) if looks * smoothing > 2.0 else 0.0,
+        max(widest, ranged or 0.0) if looks * smoothing > 2.0 else 0.0,
         looks,
     )
 

@@ -14,7 +14,7 @@ from auvdock.controllers.landing.modes import ABORT, DESCEND, DOCKED, SEARCH, TO
 from auvdock.controllers.landing.state import LandingState
 from auvdock.controllers.landing.steering import Demand, Situation, demand
 from auvdock.controllers.relative_state import RelativeFilter, RelativeState
-from auvdock.controllers.senses import Senses, Vector, read_senses, rotate, rows_of
+from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Bearing, Command, Percept, Proprioception
 from auvdock.core.landing_station import LandingStationCfg
@@ -55,7 +55,7 @@ class LandingPilot:
         self.allocator = ThrustAllocator(vehicle, cfg.allocation)
         self._dt_s = dt_s
         self._filter = RelativeFilter(cfg.filter, camera.T_body_camera, dt_s, front=(0.0, 0.0, 1.0))
-        self._R_body_camera = rows_of(camera.T_body_camera[:3, :3])
+        self._R_body_camera = np.ascontiguousarray(camera.T_body_camera[:3, :3])
         seat = flip_vector(np.array(vehicle.seat_m))
         x, y, z = (seat - camera.T_body_camera[:3, 3]).tolist()
         self._camera_to_seat: Vector = (x, y, z)
@@ -150,10 +150,9 @@ class LandingPilot:
 
     def _below(self, bearing: Bearing, senses: Senses) -> Flat | None:
         """Where a ray from the camera meets the platform's depth, relative to the vehicle, compass axes."""
-        x, y, z = bearing.ray_camera.tolist()
-        if not math.isfinite(x + y + z):
+        east, north, up = senses.level_ray(senses.yaw_rad, self._R_body_camera, bearing.ray_camera)
+        if not math.isfinite(east + north + up):
             return None
-        east, north, up = senses.level(senses.yaw_rad, rotate(self._R_body_camera, (x, y, z)))
         height = self._platform_depth_m - senses.depth_m + self._camera_up_m
         if up > -0.3 or height < 0.1:
             return None

@@ -13,21 +13,23 @@ def spread(rng, size):
 
 def test_prediction_is_f_p_ft_plus_q():
     rng = np.random.default_rng(1)
-    covariance, process = spread(rng, 4), spread(rng, 4)
+    covariance, process = spread(rng, 4), rng.random(4)
     move = np.eye(4)
     move[:2, 3] = 0.3, -0.7
-    assert _moved(covariance, 0.3, -0.7, process) == pytest.approx(move @ covariance @ move.T + process, rel=1e-12)
+    assert _moved(covariance, 0.3, -0.7, process) == pytest.approx(
+        move @ covariance @ move.T + np.diag(process), rel=1e-12
+    )
 
 
 def test_update_is_the_kalman_filters():
     rng = np.random.default_rng(2)
     for _ in range(20):
-        covariance, noise, floor = spread(rng, 4), spread(rng, 6), spread(rng, 6)
+        covariance, noise, floor = spread(rng, 4), spread(rng, 6), rng.random(6)
         innovation, turn = rng.normal(size=6), rng.normal(size=3)
         sensitivity = np.zeros((6, 4))
         sensitivity[:3, :3] = np.eye(3)
         sensitivity[3:, 3] = -turn
-        total = sensitivity @ covariance @ sensitivity.T + 1.7 * noise + floor
+        total = sensitivity @ covariance @ sensitivity.T + 1.7 * noise + np.diag(floor)
         gain = covariance @ sensitivity.T @ np.linalg.inv(total)
         distance, shift, rest = _fused(covariance, innovation, turn, noise, 1.7, floor)
         assert distance == pytest.approx(innovation @ np.linalg.solve(total, innovation))
@@ -37,7 +39,6 @@ def test_update_is_the_kalman_filters():
 
 
 def test_a_singular_innovation_is_refused():
-    zero = np.zeros((6, 6))
-    distance, _, rest = _fused(np.zeros((4, 4)), np.ones(6), np.ones(3), zero, 1.0, zero)
+    distance, _, rest = _fused(np.zeros((4, 4)), np.ones(6), np.ones(3), np.zeros((6, 6)), 1.0, np.zeros(6))
     assert distance == np.inf
     assert not rest.any()
