@@ -215,7 +215,7 @@ class Autopilot:
             self._loops,
             self._hull,
         )
-        return out[:6], AutopilotState(tuple(out[6:].tolist()), True)
+        return out[:6], AutopilotState(tuple(out.tolist()[6:]), True)
 
     def settle(self, state: AutopilotState, wanted: Array, achieved: Array) -> AutopilotState:
         """Anti-windup for what allocation could not give: İ = (τ_achieved − τ_wanted) k_i/k_p (back-calculation)."""

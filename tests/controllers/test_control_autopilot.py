@@ -9,7 +9,9 @@ import pytest
 from control_bench import DT_S, VEHICLE, Boat
 
 from auvdock.controllers.allocation import ThrustAllocator
-from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotSetpoint
+from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotSetpoint, AutopilotState
+from auvdock.controllers.linear_model import hydrodynamic_wrench
+from auvdock.core.contracts import Proprioception
 
 AUTOPILOT = Autopilot(VEHICLE, AutopilotCfg(), DT_S)
 ALLOCATOR = ThrustAllocator(VEHICLE)
@@ -83,3 +85,19 @@ def test_impossible_demands_do_not_wind_up():
         state = AUTOPILOT.settle(state, wrench, achieved)
         boat.step(values)
     assert abs(float(boat.senses().velocity_ground_m_s[1])) < 0.02
+
+
+@pytest.mark.parametrize("velocity", [(0.5, 0.0, 0.0), (0.4, 0.1, -0.05), (-0.3, -0.1, 0.1)])
+def test_feed_forward_balances_the_water_at_a_steady_speed(velocity):
+    """Outside reference: the drag, lift and Munk moment of the linear model; the net weight acts along heave."""
+    still, speed = np.zeros(3), np.array(velocity)
+    state = AutopilotState((*velocity, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), True)
+    setpoint = AutopilotSetpoint(velocity[0], velocity[1], velocity[2], 0.0, 0.0)
+    wrench, after = AUTOPILOT.step(state, setpoint, Proprioception(0.0, 8.0, still, still, speed, speed))
+    expected = -hydrodynamic_wrench(VEHICLE, np.array([*velocity, 0.0, 0.0, 0.0]))
+    expected[2] += VEHICLE.mass_kg * 9.81 - VEHICLE.buoyancy_n
+    rows = [0, 1, 2, 4, 5]
+    np.testing.assert_allclose(wrench[rows], expected[rows], atol=1e-9)
+    assert after.references_m_s == pytest.approx(velocity)
+    assert after.current_m_s == (0.0, 0.0, 0.0)
+    assert AUTOPILOT.initial_state().current_m_s is None

@@ -13,6 +13,7 @@ from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.guidance import (
     GuidanceCfg,
     approach_speed,
+    axis_course,
     axis_law,
     corridor_m,
     crab_angle,
@@ -85,6 +86,53 @@ def test_crab_brings_sway_within_reach(forward, port, reach):
     if abs(port) <= reach:
         assert angle == 0.0
     assert crab_angle(forward, -port, reach, math.pi) == pytest.approx(-angle)
+
+
+def course(place, integrals=(0.0, 0.0), hold=False, committed=False, turn=0.0, current=(0.0, 0.0)):
+    """On an axis that leads east: surge, sway, heave, heading offset, integrals."""
+    (distance, port, up), (a, b), (x, y), ahead = place, integrals, current, CFG.lookahead_mid_m
+    return axis_course(LAW, distance, port, up, math.hypot(port, up), 0.0, a, b, hold, committed, ahead, turn, x, y)
+
+
+@given(
+    distance=st.floats(-1.0, 12.0),
+    port=st.floats(-2.0, 2.0),
+    up=st.floats(-2.0, 2.0),
+    turn=st.floats(-0.5, 0.5),
+    across=st.floats(-0.7, 0.7),
+    hold=st.booleans(),
+    committed=st.booleans(),
+)
+def test_the_way_along_the_axis_mirrors(distance, port, up, turn, across, hold, committed):
+    there = course((distance, port, up), (0.2, -0.1), hold, committed, turn, (0.1, across))
+    mirrored = course((distance, -port, up), (-0.2, -0.1), hold, committed, -turn, (0.1, -across))
+    surge, sway, heave, offset, port_integral, up_integral = mirrored
+    assert there == pytest.approx((surge, -sway, heave, -offset, -port_integral, up_integral))
+
+
+def test_speeds_along_the_axis_follow_the_stages():
+    assert course((5.0, 0.0, 0.0))[:4] == (CFG.mid_speed_m_s, 0.0, 0.0, 0.0)
+    assert course((0.1, 0.0, 0.0), committed=True)[0] == CFG.entry_speed_m_s
+    assert course((-1.1, 0.0, 0.0), committed=True)[0] == CFG.tube_speed_m_s
+    gate = ModeCfg().gate_distance_m
+    assert course((gate, 0.0, 0.0), hold=True)[0] == 0.0
+    assert course((gate - 0.5, 0.0, 0.0), hold=True)[0] == pytest.approx(-0.15)
+    # A set-point is given at the present heading: turned to port, the way ahead is to starboard.
+    surge, sway, *_ = course((5.0, 0.0, 0.0), turn=0.3)
+    assert (surge, sway) == pytest.approx((0.5 * math.cos(0.3), -0.5 * math.sin(0.3)))
+
+
+def test_a_cross_current_beyond_reach_raises_the_speed_and_crabs():
+    surge, *_, offset, _, _ = course((2.0, 0.0, 0.0), committed=True, current=(0.0, 0.6))
+    assert surge == CFG.rush_speed_m_s
+    assert offset < -0.1
+    assert course((2.0, 0.0, 0.0), committed=True, current=(0.0, 0.3))[3] == 0.0
+
+
+def test_integrals_stand_still_off_the_corridor_and_inside_the_funnel():
+    assert course((4.0, 0.1, -0.1))[4] > 0.0 > course((4.0, 0.1, -0.1))[5]
+    assert course((4.0, 1.0, 0.0), (0.3, 0.2))[4:] == (0.3, 0.2)
+    assert course((-0.1, 0.1, 0.0), (0.3, 0.2))[4:] == (0.3, 0.2)
 
 
 def test_sway_reach_loads_the_actuators_to_the_given_share():

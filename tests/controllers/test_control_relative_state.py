@@ -119,14 +119,46 @@ def test_bearing_of_the_entrance_corrects_a_sideways_error():
     assert start is not None
     x, y, z = start.camera_m
     state = start._replace(camera_m=(x, y + 0.2, z - 0.15), covariance=np.diag([0.04, 0.04, 0.04, 1e-4]))
-    ray = track.T_station_camera[:3, :3].T @ (np.array(TARGET) - track.T_station_camera[:3, 3])
-    ray /= np.linalg.norm(ray)
+    ray = sight_of_the_target(track)
     for _ in range(40):
         state = FILTER.update(state, track.senses, ray_camera=ray)
     truth = track.T_station_camera[:3, 3]
     assert abs(state.camera_m[1] - truth[1]) < 0.04
     assert abs(state.camera_m[2] - truth[2]) < 0.04
     assert state.cross_track_sigma_m < 0.1
+
+
+def sight_of_the_target(track):
+    ray = track.T_station_camera[:3, :3].T @ (np.array(TARGET) - track.T_station_camera[:3, 3])
+    return ray / np.linalg.norm(ray)
+
+
+def test_a_period_is_its_steps_one_after_another():
+    rng = np.random.default_rng(3)
+    state = FILTER.start(Track(18.0).pose(), Track(18.0).senses)
+    assert state is not None
+    track = Track(18.0 + DT_S)
+    pose, ray = track.pose(rng), sight_of_the_target(track)
+    whole = FILTER.advance(state, track.senses, pose, ray)
+    steps = FILTER.update(FILTER.advance(state, track.senses), track.senses, pose)
+    steps = FILTER.update(steps, track.senses, ray_camera=ray)
+    np.testing.assert_array_equal(whole.covariance, steps.covariance)
+    assert whole[:2] == steps[:2]
+    assert whole[3:] == steps[3:] == (0.0, 2, 0, 0)
+
+
+def test_the_bearing_counts_in_the_period_in_which_the_filter_starts_anew():
+    track = Track(18.0)
+    start, jumped = FILTER.start(track.pose(), track.senses), track.pose(shift_m=(0.0, 1.5, 0.0))
+    fresh = FILTER.start(jumped, track.senses, restarts=1)
+    assert start is not None
+    assert fresh is not None
+    track.T_station_camera = jumped.T_station_camera
+    ray = sight_of_the_target(track) + np.array([0.0, 0.01, 0.0])
+    after = FILTER.advance(start._replace(refused=CFG.restart_after - 1), track.senses, jumped, ray)
+    expected = FILTER.update(fresh, track.senses, ray_camera=ray)
+    assert after.camera_m == expected.camera_m != fresh.camera_m
+    assert after[3:] == (0.0, 1, 0, 1)
 
 
 def test_updates_do_not_touch_their_arguments():
