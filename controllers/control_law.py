@@ -80,9 +80,9 @@ def body_wrench(
     measured = water if through_water else ground
     references, current = out[6:9], out[9:12]
     # Current: ground minus water velocity, smoothed.
-    flow = ground - water
+    ahead, port, up = ground[0] - water[0], ground[1] - water[1], ground[2] - water[2]
     for i in range(3):
-        now = world[i, 0] * flow[0] + world[i, 1] * flow[1] + world[i, 2] * flow[2]
+        now = world[i, 0] * ahead + world[i, 1] * port + world[i, 2] * up
         current[i] = state[3 + i] + smoothing * (now - state[3 + i])
     # References move towards the set-point at a bounded rate, not far from the measured speed.
     dt_s = limits[_DT]
@@ -94,10 +94,12 @@ def body_wrench(
         moved = state[i] + _clip(target - state[i], bound * dt_s)
         references[i] = now + _clip(moved - now, limits[_MAX_SPEED_ERROR])
         inertia[i] = hull[21, i] * _clip((references[i] - state[i]) / dt_s, bound)
-    wanted, drift, push, lift = _back(level, references), _back(world, current), _back(level, inertia), np.zeros(3)
-    lift[2] = limits[_NET_WEIGHT]
-    lift = _back(level, lift)
-    balance = _balance(wanted if through_water else wanted - drift, hull)
+    wanted, drift, push, weight = _back(level, references), _back(world, current), _back(level, inertia), np.zeros(3)
+    weight[2] = limits[_NET_WEIGHT]
+    lift = _back(level, weight)
+    if through_water:
+        drift = np.zeros(3)
+    balance = _balance(wanted[0] - drift[0], wanted[1] - drift[1], wanted[2] - drift[2], hull)
     for axis in range(count):
         row = int(loops[axis, 0])
         feed, rate = balance[row], 0.0
@@ -172,20 +174,19 @@ def pid_step(
 
 
 @compiled
-def _balance(velocity: Array, hull: Array) -> Array:
+def _balance(x: float, y: float, z: float, hull: Array) -> Array:
     """Wrench (6,) that balances drag, lift and Munk moment at a steady velocity through the water without rotation."""
-    wrench, momentum, speed = np.zeros(6), np.zeros(3), abs(velocity[0])
+    wrench, momentum = np.zeros(6), np.zeros(3)
     for row in range(6):
         for column in range(3):
-            part = velocity[column]
-            drag = hull[row, column] + hull[6 + row, column] * abs(part) + hull[12 + row, column] * speed
+            part = x if column == 0 else y if column == 1 else z
+            drag = hull[row, column] + hull[6 + row, column] * abs(part) + hull[12 + row, column] * abs(x)
             wrench[row] -= drag * part
     for row in range(3):
-        added = hull[18 + row]
-        momentum[row] = added[0] * velocity[0] + added[1] * velocity[1] + added[2] * velocity[2]
-    wrench[3] += velocity[1] * momentum[2] - velocity[2] * momentum[1]
-    wrench[4] += velocity[2] * momentum[0] - velocity[0] * momentum[2]
-    wrench[5] += velocity[0] * momentum[1] - velocity[1] * momentum[0]
+        momentum[row] = hull[18 + row, 0] * x + hull[18 + row, 1] * y + hull[18 + row, 2] * z
+    wrench[3] += y * momentum[2] - z * momentum[1]
+    wrench[4] += z * momentum[0] - x * momentum[2]
+    wrench[5] += x * momentum[1] - y * momentum[0]
     return wrench
 
 

@@ -64,7 +64,7 @@ def relative_period(
         The sheet (6, 4).
     """
     sheet = np.zeros((6, 4))
-    sheet[:4] = covariance
+    _copy(covariance, sheet)
     sheet[4, 0], sheet[4, 1], sheet[4, 2], sheet[4, 3] = x, y, z, axis_yaw_rad
     if dt_s > 0.0:
         _reckon(sheet, motion, yaw_rad, dt_s, mounting, law[:4])
@@ -87,7 +87,7 @@ def _reckon(sheet: Array, motion: Array, yaw_rad: float, dt_s: float, mounting: 
         velocity[i] = turned[i, 0] * ahead + turned[i, 1] * port + turned[i, 2] * up
         sheet[4, i] += velocity[i] * dt_s
     # A turn of the axis turns the velocity the other way: ∂v/∂ψ_s = −e_z × v.
-    sheet[:4] = _moved(sheet[:4], velocity[1] * dt_s, -velocity[0] * dt_s, process)
+    _copy(_moved(sheet[:4], velocity[1] * dt_s, -velocity[0] * dt_s, process), sheet)
 
 
 @compiled
@@ -123,7 +123,7 @@ def _fuse_pose(
     distance, shift, rest = _fused(sheet[:4], innovation, predicted[2], noise, law[6], law[:6])
     if not distance < law[7]:
         return REFUSED
-    sheet[:4] = rest
+    _copy(rest, sheet)
     _shift(sheet, shift)
     return ACCEPTED
 
@@ -144,8 +144,9 @@ def _fuse_bearing(
     if not (math.isfinite(ray[0] + ray[1] + ray[2]) and ray[2] > _LEAST_AHEAD):
         return LEFT_OUT
     c = _station_camera(motion, yaw_rad - sheet[4, 3], mounting)
-    to_target = mounting[4] - sheet[4, :3]
-    d = np.empty(3)
+    to_target, d = np.empty(3), np.empty(3)
+    for i in range(3):
+        to_target[i] = mounting[4, i] - sheet[4, i]
     for i in range(3):
         d[i] = c[0, i] * to_target[0] + c[1, i] * to_target[1] + c[2, i] * to_target[2]
     if d[2] < law[3]:
@@ -176,6 +177,14 @@ def _fuse_bearing(
                 sheet[i, j] -= scale * spread[i] * spread[j]
     _shift(sheet, shift)
     return ACCEPTED
+
+
+@compiled
+def _copy(covariance: Array, sheet: Array) -> None:
+    """Write P; element by element, as Numba compiles an assignment of slices for seconds."""
+    for i in range(4):
+        for j in range(4):
+            sheet[i, j] = covariance[i, j]
 
 
 @compiled

@@ -98,10 +98,9 @@ def read_senses(proprioception: Proprioception) -> Senses:
 def _motion(euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array) -> Array:
     """`Senses.motion`; the rotation is Ry(pitch) Rx(roll), as `transforms.rotation_from_euler_zyx` without yaw."""
     motion = np.empty(20)
-    motion[:2] = euler_rad[:2]
-    motion[2:5] = rate_rad_s
-    motion[5:8] = ground_m_s
-    motion[8:11] = water_m_s
+    motion[0], motion[1] = euler_rad[0], euler_rad[1]
+    for i in range(3):
+        motion[2 + i], motion[5 + i], motion[8 + i] = rate_rad_s[i], ground_m_s[i], water_m_s[i]
     for i in range(11):
         if not math.isfinite(motion[i]):
             motion[i] = 0.0
