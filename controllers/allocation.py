@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
+from auvdock.controllers.planar_groups import add_planar, beyond_dead_band, least_planar, planar_groups
 from auvdock.core.arrays import Array, check_shape
-from auvdock.core.compiled import compiled
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import VehicleCfg
 
@@ -67,6 +67,7 @@ class ThrustAllocator:
             for group_rows, columns in _components(self._full, rows)
         ]
         self._dead_band = np.array([actuator.dead_band for actuator in vehicle.actuators], dtype=np.float64)
+        self._count = len(self._dead_band)
         self._table = np.zeros((len(self._groups), _WIDTH))
         start = 0
         for index, group in enumerate(self._groups):
@@ -106,17 +107,17 @@ class ThrustAllocator:
         if wrench_body.shape != (6,):
             check_shape("wrench_body", wrench_body, (6,))
         effect = surge_m_s * abs(surge_m_s)
-        given = _planar_groups(self._table, self._members, self._dead_band, wrench_body, effect)
-        count = len(self._dead_band)
-        values, achieved = given[:count], given[count : count + 6]
-        if given.item(-1):  # how many groups are left: of more than two axes, or out of reach
+        values, achieved, reached = np.empty(self._count), np.zeros(6), np.empty(len(self._groups))
+        if not planar_groups(
+            values, achieved, reached, self._table, self._members, self._dead_band, wrench_body, effect
+        ):
             wanted: list[float] = wrench_body.tolist()
-            for group, is_left in zip(self._groups, given[count + 6 : -1].tolist(), strict=True):
-                if is_left:
+            for group, is_done in zip(self._groups, reached.tolist(), strict=True):
+                if not is_done:
                     commands = group.solve(wanted, effect, moments_first)
                     group.add_wrench(achieved, commands, effect)
                     for column, value in zip(group.columns, commands, strict=True):
-                        values[column] = _beyond_dead_band(value, float(self._dead_band[column]))
+                        values[column] = beyond_dead_band(value, float(self._dead_band[column]))
         return values, achieved
 
 
@@ -177,7 +178,7 @@ class _Group:
     def add_wrench(self, wrench: Array, commands: list[float], fin_effect: float) -> None:
         """Add the wrench of the commands."""
         if self.planar is not None:
-            _add_planar(self.planar, self.members, np.array(commands), fin_effect, wrench)
+            add_planar(self.planar, self.members, np.array(commands), fin_effect, wrench)
             return
         for row, line in zip(self.rows, self._scaled(fin_effect), strict=True):
             wrench[row] += sum(value * command for value, command in zip(line, commands, strict=True))
@@ -193,7 +194,7 @@ class _Group:
         """Commands W⁻¹ Bᵀ (B W⁻¹ Bᵀ)⁻¹ τ, in closed form for one and two axes."""
         if self.planar is not None:
             closed = np.empty(len(self.columns))
-            if _least_planar(self.planar, self.members, np.array(wrench), fin_effect, closed):
+            if least_planar(self.planar, self.members, np.array(wrench), fin_effect, closed):
                 return closed.tolist()
         if self._inverse is not None:
             direct: list[float] = (self._inverse @ np.array([wrench[row] for row in self.rows])).tolist()
@@ -321,75 +322,3 @@ def _longest(base: list[float], push: list[float], null: list[float] | None) -> 
     if null is not None:
         commands = [command + shift * part for command, part in zip(commands, null, strict=True)]
     return [min(1.0, max(-1.0, command)) for command in commands], reach
-
-
-@compiled
-def _planar_groups(table: Array, members: Array, dead_band: Array, wrench: Array, fin_effect: float) -> Array:
-    """All groups of at most two axes whose wrench is within reach.
-
-    Args:
-        table: (g, 10) of each group: first and last but one of its members, its two rows, the upper triangles of its
-            Gram matrices of thrusters and of fins; 0 for a group of more axes.
-        members: (m, 5) actuator, its effect on the two rows, inverse weight, whether it is a fin.
-        dead_band: (n,) of the actuators.
-        wrench: (6,) wanted.
-        fin_effect: u |u|.
-
-    Returns:
-        (n + 6 + g + 1,) commands beyond the dead band, the wrench that they give dead band apart, for each group 1 if
-        it is left, and how many are.
-    """
-    count = len(dead_band)
-    out = np.zeros(count + 6 + len(table) + 1)
-    for index in range(len(table)):
-        group = table[index]
-        mine = members[int(group[0]) : int(group[1])]
-        commands = np.empty(len(mine))
-        reached = len(mine) > 0 and _least_planar(group, mine, wrench, fin_effect, commands)
-        for command in commands:
-            reached = reached and -1.0 <= command <= 1.0
-        if not reached:
-            out[count + 6 + index] = 1.0
-            out[-1] += 1.0
-            continue
-        _add_planar(group, mine, commands, fin_effect, out[count : count + 6])
-        for member in range(len(mine)):
-            column = int(mine[member, 0])
-            out[column] = _beyond_dead_band(commands[member], dead_band[column])
-    return out
-
-
-@compiled
-def _least_planar(group: Array, members: Array, wrench: Array, fin_effect: float, commands: Array) -> bool:
-    """Commands W⁻¹ Bᵀ (B W⁻¹ Bᵀ)⁻¹ τ of a planar group, into `commands`; False where the inverse is ill-conditioned."""
-    square = fin_effect * fin_effect
-    a, b, d = group[4] + square * group[7], group[5] + square * group[8], group[6] + square * group[9]
-    determinant = a * d - b * b
-    if not determinant > _TINY * a * d:
-        return False
-    x, y = wrench[int(group[2])], wrench[int(group[3])]
-    m, n = (d * x - b * y) / determinant, (a * y - b * x) / determinant
-    for i in range(len(members)):
-        scale = fin_effect if members[i, 4] != 0.0 else 1.0
-        commands[i] = members[i, 3] * (members[i, 1] * m + members[i, 2] * n) * scale
-    return True
-
-
-@compiled
-def _add_planar(group: Array, members: Array, commands: Array, fin_effect: float, wrench: Array) -> None:
-    """Add the wrench of a planar group's commands."""
-    x = y = 0.0
-    for i in range(len(members)):
-        share = commands[i] * fin_effect if members[i, 4] != 0.0 else commands[i]
-        x += members[i, 1] * share
-        y += members[i, 2] * share
-    wrench[int(group[2])] += x
-    wrench[int(group[3])] += y  # with one axis y is 0
-
-
-@compiled
-def _beyond_dead_band(command: float, band: float) -> float:
-    """A command within the dead band would give nothing: 0 or the band's edge, whichever is nearer."""
-    if not -band < command < band:
-        return command
-    return 0.0 if abs(command) <= 0.5 * band else math.copysign(band, command)

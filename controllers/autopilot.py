@@ -197,7 +197,10 @@ class Autopilot:
         if setpoint.depth_m is not None:
             bound = self._max_heave_m_s
             heave = min(bound, max(-bound, self._depth_gain * (senses.depth_m - setpoint.depth_m)))
-        out = body_wrench(
+        wrench, memory = np.zeros(6), np.empty(len(state.values))
+        body_wrench(
+            wrench,
+            memory,
             state.values,
             senses.motion,
             senses.yaw_rad,
@@ -215,7 +218,7 @@ class Autopilot:
             self._loops,
             self._hull,
         )
-        return out[:6], AutopilotState(tuple(out.tolist()[6:]), True)
+        return wrench, AutopilotState(tuple(memory.tolist()), True)
 
     def settle(self, state: AutopilotState, wanted: Array, achieved: Array) -> AutopilotState:
         """Anti-windup for what allocation could not give: İ = (τ_achieved − τ_wanted) k_i/k_p (back-calculation)."""

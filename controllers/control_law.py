@@ -25,6 +25,8 @@ _SURGE_ACCELERATION, _SWAY_ACCELERATION, _MAX_SPEED_ERROR, _INTEGRAL_ZONE, _NET_
 
 @compiled
 def body_wrench(
+    wrench: Array,
+    memory: Array,
     state: tuple[float, ...],
     motion: Array,
     yaw_rad: float,
@@ -40,10 +42,12 @@ def body_wrench(
     limits: Array,
     loops: Array,
     hull: Array,
-) -> Array:
+) -> None:
     """One period of the autopilot: τ = PID(error) + feed-forward for each axis.
 
     Args:
+        wrench: (6,) of zeros; here goes the wrench in body axes in N and N m.
+        memory: (6 + n,) here goes the next state.
         state: (6 + n,) speed references in the level heading frame in m/s, smoothed current in world axes in m/s,
             integrals of the n loops.
         motion: (20,) `Senses.motion`.
@@ -64,12 +68,7 @@ def body_wrench(
             where it is controlled.
         hull: (22, 3) linear, quadratic and lift damping, six rows each, by the velocity's column; added mass of the
             velocity, three rows; mass with added mass of surge, sway and heave.
-
-    Returns:
-        (12 + n,) wrench in body axes in N and N m, then the next state.
     """
-    count = len(loops)
-    out = np.zeros(12 + count)
     level, cosine, sine = motion[11:].reshape(3, 3), math.cos(yaw_rad), math.sin(yaw_rad)
     world = np.empty((3, 3))
     for i in range(3):
@@ -78,7 +77,7 @@ def body_wrench(
         world[2, i] = level[2, i]
     ground, water = motion[5:8], motion[8:11]
     measured = water if through_water else ground
-    references, current = out[6:9], out[9:12]
+    references, current = memory[:3], memory[3:6]
     # Current: ground minus water velocity, smoothed.
     ahead, port, up = ground[0] - water[0], ground[1] - water[1], ground[2] - water[2]
     for i in range(3):
@@ -100,7 +99,7 @@ def body_wrench(
     if through_water:
         drift = np.zeros(3)
     balance = _balance(wanted[0] - drift[0], wanted[1] - drift[1], wanted[2] - drift[2], hull)
-    for axis in range(count):
+    for axis in range(len(loops)):
         row = int(loops[axis, 0])
         feed, rate = balance[row], 0.0
         if axis < 3:
@@ -117,10 +116,9 @@ def body_wrench(
         kp, ki, kd, limit = loops[axis, 1], loops[axis, 2], loops[axis, 3], loops[axis, 4]
         integral = state[6 + axis]
         output, after = pid_step(kp, ki, kd, integral, error, rate, feed, limit, dt_s)
-        out[row] = output
+        wrench[row] = output
         turning = axis >= 3 and abs(error) > limits[_INTEGRAL_ZONE]
-        out[12 + axis] = integral if turning else after
-    return out
+        memory[6 + axis] = integral if turning else after
 
 
 @compiled

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from auvdock.controllers.allocation import AllocationCfg, ThrustAllocator
-from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotState
+from auvdock.controllers.autopilot import Autopilot, AutopilotCfg
 from auvdock.controllers.guidance import GuidanceCfg, axis_law, corridor_m, sway_reach_m_s
 from auvdock.controllers.modes import (
     ABORT,
@@ -23,6 +23,7 @@ from auvdock.controllers.modes import (
     ModeCfg,
     next_mode,
 )
+from auvdock.controllers.pilot_state import PilotState
 from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
 from auvdock.controllers.rotating.config import RotatingControlCfg
 from auvdock.controllers.senses import Senses, Vector, read_senses
@@ -80,42 +81,6 @@ class ControlCfg:
     """The way to the cone before the mouth, by a rotating beacon."""
     controller: str = "own"
     """"own", the station's pilot, or a pilot of yours as "package.module:Name" (`auvdock.controllers.named`)."""
-
-
-class PilotState(NamedTuple):
-    """All that the pilot remembers; immutable.
-
-    Attributes:
-        mode: current mode.
-        since_s: when it began; None before the first step.
-        attempts: approaches begun.
-        giving_up: no attempt is left.
-        relative: place before the station, None before the first pose.
-        sight: last far light, None before the first.
-        autopilot: integrals and references of the loops.
-        integrals: of the cross-track laws, port and up.
-        offset_rad: wanted heading relative to the axis.
-        anchor_rad, anchor_depth_m: heading and depth when the mode began.
-        side: where a search turns first, +1 is port.
-        best_m, best_s: least distance in near or terminal, and when it was reached.
-        gate_s: when the vehicle came to the gate in mid, None if it is not there.
-    """
-
-    mode: str
-    since_s: float | None
-    attempts: int
-    giving_up: bool
-    relative: RelativeState | None
-    sight: Sight | None
-    autopilot: AutopilotState
-    integrals: tuple[float, float]
-    offset_rad: float
-    anchor_rad: float
-    anchor_depth_m: float
-    side: float
-    best_m: float
-    best_s: float
-    gate_s: float | None
 
 
 class ConicalPilot:
@@ -217,7 +182,8 @@ class ConicalPilot:
             best_s,
             gate_s,
         )
-        return state, place, self._facts(state, place, senses, _restarts(relative) > _restarts(before))
+        jumped = relative is not None and before is not None and relative.restarts > before.restarts
+        return state, place, self._facts(state, place, senses, jumped)
 
     def fly(self, state: PilotState, place: Place | None, senses: Senses) -> tuple[Command, PilotState]:
         """The second half: steer in the state's mode and command the actuators."""
@@ -257,12 +223,14 @@ class ConicalPilot:
         x, y, z = senses.level(heading, self._camera_to_nose)
         px, py, pz = relative.camera_m
         # Flying in means looking along -x of the station: port is then -y.
+        port_m, up_m = -(py + y), pz + z
         return Place(
             px + x,
-            -(py + y),
-            pz + z,
+            port_m,
+            up_m,
             relative.axis_yaw_rad + math.pi,
             math.remainder(heading - math.pi, math.tau),
+            math.hypot(port_m, up_m),
         )
 
     def _progress(self, state: PilotState, place: Place | None, now_s: float) -> tuple[float, float, float | None]:
@@ -270,9 +238,10 @@ class ConicalPilot:
         best_m, best_s, gate_s = state.best_m, state.best_s, state.gate_s
         if place is None:
             return best_m, best_s, gate_s
-        if place.distance_m < best_m - self.cfg.modes.progress_m:
-            best_m, best_s = place.distance_m, now_s
-        if state.mode != MID or place.distance_m > self.cfg.modes.gate_distance_m + 0.5:
+        modes, distance_m = self.cfg.modes, place.distance_m
+        if distance_m < best_m - modes.progress_m:
+            best_m, best_s = distance_m, now_s
+        if state.mode != MID or distance_m > modes.gate_distance_m + 0.5:
             gate_s = None
         elif gate_s is None:
             gate_s = now_s
@@ -413,7 +382,3 @@ class ConicalPilot:
             state.gate_s,
         )
         return Command(values, state.mode, log, state.giving_up), after
-
-
-def _restarts(relative: RelativeState | None) -> int:
-    return relative.restarts if relative is not None else 0

@@ -111,6 +111,7 @@ class RelativeFilter:
             target_m: the light whose direction may be fused, station frame.
         """
         self._cfg = cfg
+        self._restart_after = cfg.restart_after
         self._front = front
         self._dt_s = dt_s
         self._R_body_camera = np.ascontiguousarray(T_body_camera[:3, :3])
@@ -145,15 +146,12 @@ class RelativeFilter:
         pose: PoseEstimate | None,
         ray_camera: Array | None,
     ) -> RelativeState:
-        x, y, z = state.camera_m
         T, cov = (pose.T_station_camera, pose.covariance) if pose is not None else (_NO_POSE, _NO_NOISE)
-        impatient = state.refused + 1 >= self._cfg.restart_after
-        sheet = relative_period(
-            state.covariance,
-            x,
-            y,
-            z,
-            state.axis_yaw_rad,
+        impatient = state.refused + 1 >= self._restart_after
+        estimate, covariance = np.array((*state.camera_m, state.axis_yaw_rad)), state.covariance.copy()
+        of_pose, of_bearing = relative_period(
+            estimate,
+            covariance,
             senses.motion,
             senses.yaw_rad,
             dt_s,
@@ -164,7 +162,7 @@ class RelativeFilter:
             impatient,
             ray_camera if ray_camera is not None else _NO_RAY,
         )
-        (x, y, z, axis_yaw_rad), (of_pose, of_bearing, _, _) = sheet[4:].tolist()
+        x, y, z, axis_yaw_rad = estimate.tolist()
         if dt_s == 0.0 and of_pose == LEFT_OUT and of_bearing != ACCEPTED:
             return state
         since_fix_s, fixes, refused = state.since_fix_s + dt_s, state.fixes, state.refused
@@ -172,7 +170,7 @@ class RelativeFilter:
             since_fix_s, fixes, refused = 0.0, fixes + 1, 0
         elif of_pose == REFUSED:
             refused += 1
-        after = RelativeState((x, y, z), axis_yaw_rad, sheet[:4], since_fix_s, fixes, refused, state.restarts)
+        after = RelativeState((x, y, z), axis_yaw_rad, covariance, since_fix_s, fixes, refused, state.restarts)
         if pose is None or of_pose != REFUSED or not impatient:
             return after
         fresh = self.start(pose, senses, state.restarts + 1)

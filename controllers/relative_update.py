@@ -1,7 +1,6 @@
 """The relative filter's arithmetic, compiled: dead reckoning, fusing a pose, fusing a bearing.
 
-Everything works on one array (6, 4), the sheet: rows 0 to 3 are the covariance P of (x, y, z, ψ_s), row 4 is the
-estimate itself, and row 5 begins with the verdicts on the pose and on the bearing.
+Everything works in place on two arrays: the estimate (x, y, z, ψ_s), and its covariance P (4, 4).
 """
 
 from __future__ import annotations
@@ -25,11 +24,8 @@ _LEAST_AHEAD = 0.2
 
 @compiled
 def relative_period(
+    estimate: Array,
     covariance: Array,
-    x: float,
-    y: float,
-    z: float,
-    axis_yaw_rad: float,
     motion: Array,
     yaw_rad: float,
     dt_s: float,
@@ -39,15 +35,12 @@ def relative_period(
     noise: Array,
     impatient: bool,
     ray: Array,
-) -> Array:
+) -> tuple[float, float]:
     """One period: dead reckoning, then a pose, then a bearing, as far as they came.
 
     Args:
-        covariance: (4, 4) P.
-        x: of the camera in the station frame, m.
-        y: of the camera in the station frame, m.
-        z: of the camera in the station frame, m.
-        axis_yaw_rad: ψ_s.
+        estimate: (4,) camera in the station frame in m, ψ_s in rad; brought up to date in place.
+        covariance: (4, 4) P; likewise.
         motion: (20,) `Senses.motion`.
         yaw_rad: compass heading.
         dt_s: period; 0 to leave the dead reckoning out.
@@ -61,38 +54,38 @@ def relative_period(
         ray: (3,) unit direction to the light in the camera frame; 0 for none.
 
     Returns:
-        The sheet (6, 4).
+        The verdicts on the pose and on the bearing.
     """
-    sheet = np.zeros((6, 4))
-    _copy(covariance, sheet)
-    sheet[4, 0], sheet[4, 1], sheet[4, 2], sheet[4, 3] = x, y, z, axis_yaw_rad
     if dt_s > 0.0:
-        _reckon(sheet, motion, yaw_rad, dt_s, mounting, law[:4])
-    sheet[5, 0] = _fuse_pose(sheet, motion, yaw_rad, mounting, pose, noise, law[4:13])
-    if not (impatient and sheet[5, 0] == REFUSED):
-        sheet[5, 1] = _fuse_bearing(sheet, motion, yaw_rad, mounting, ray, law[13:])
-    return sheet
+        _reckon(estimate, covariance, motion, yaw_rad, dt_s, mounting, law[:4])
+    of_pose = _fuse_pose(estimate, covariance, motion, yaw_rad, mounting, pose, noise, law[4:13])
+    if impatient and of_pose == REFUSED:
+        return of_pose, LEFT_OUT
+    return of_pose, _fuse_bearing(estimate, covariance, motion, yaw_rad, mounting, ray, law[13:])
 
 
 @compiled
-def _reckon(sheet: Array, motion: Array, yaw_rad: float, dt_s: float, mounting: Array, process: Array) -> None:
+def _reckon(
+    estimate: Array, covariance: Array, motion: Array, yaw_rad: float, dt_s: float, mounting: Array, process: Array
+) -> None:
     """ṗ = R_station_body (v + ω × r_camera), P ← F P Fᵀ + Q."""
     body, rate, lever = motion[5:8], motion[2:5], mounting[3]
     ahead = body[0] + (rate[1] * lever[2] - rate[2] * lever[1])
     port = body[1] + (rate[2] * lever[0] - rate[0] * lever[2])
     up = body[2] + (rate[0] * lever[1] - rate[1] * lever[0])
-    turned = _station_body(motion, yaw_rad - sheet[4, 3])
+    turned = _station_body(motion, yaw_rad - estimate[3])
     velocity = np.empty(3)
     for i in range(3):
         velocity[i] = turned[i, 0] * ahead + turned[i, 1] * port + turned[i, 2] * up
-        sheet[4, i] += velocity[i] * dt_s
+        estimate[i] += velocity[i] * dt_s
     # A turn of the axis turns the velocity the other way: ∂v/∂ψ_s = −e_z × v.
-    _copy(_moved(sheet[:4], velocity[1] * dt_s, -velocity[0] * dt_s, process), sheet)
+    _move(covariance, velocity[1] * dt_s, -velocity[0] * dt_s, process)
 
 
 @compiled
 def _fuse_pose(
-    sheet: Array,
+    estimate: Array,
+    covariance: Array,
     motion: Array,
     yaw_rad: float,
     mounting: Array,
@@ -107,7 +100,7 @@ def _fuse_pose(
     """
     if not (_is_finite(pose) and _is_finite(noise)):
         return LEFT_OUT
-    predicted = _station_camera(motion, yaw_rad - sheet[4, 3], mounting)
+    predicted = _station_camera(motion, yaw_rad - estimate[3], mounting)
     e = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
@@ -116,21 +109,24 @@ def _fuse_pose(
         return REFUSED
     innovation = np.empty(6)
     for i in range(3):
-        innovation[i] = pose[i, 3] - sheet[4, i]
+        innovation[i] = pose[i, 3] - estimate[i]
     innovation[3] = 0.5 * (e[2, 1] - e[1, 2])
     innovation[4] = 0.5 * (e[0, 2] - e[2, 0])
     innovation[5] = 0.5 * (e[1, 0] - e[0, 1])
-    distance, shift, rest = _fused(sheet[:4], innovation, predicted[2], noise, law[6], law[:6])
+    distance, shift, rest = _fused(covariance, innovation, predicted[2], noise, law[6], law[:6])
     if not distance < law[7]:
         return REFUSED
-    _copy(rest, sheet)
-    _shift(sheet, shift)
+    for i in range(4):
+        for j in range(4):
+            covariance[i, j] = rest[i, j]
+    _shift(estimate, shift)
     return ACCEPTED
 
 
 @compiled
 def _fuse_bearing(
-    sheet: Array,
+    estimate: Array,
+    covariance: Array,
     motion: Array,
     yaw_rad: float,
     mounting: Array,
@@ -143,10 +139,10 @@ def _fuse_bearing(
     """
     if not (math.isfinite(ray[0] + ray[1] + ray[2]) and ray[2] > _LEAST_AHEAD):
         return LEFT_OUT
-    c = _station_camera(motion, yaw_rad - sheet[4, 3], mounting)
+    c = _station_camera(motion, yaw_rad - estimate[3], mounting)
     to_target, d = np.empty(3), np.empty(3)
     for i in range(3):
-        to_target[i] = mounting[4, i] - sheet[4, i]
+        to_target[i] = mounting[4, i] - estimate[i]
     for i in range(3):
         d[i] = c[0, i] * to_target[0] + c[1, i] * to_target[1] + c[2, i] * to_target[2]
     if d[2] < law[3]:
@@ -162,38 +158,30 @@ def _fuse_bearing(
         rows[n, 0], rows[n, 1], rows[n, 2] = -ax, -ay, -(c[2, n] - ratio * c[2, 2]) / d[2]
         rows[n, 3] = ax * tx + ay * ty
         misses[n] = measured - ratio
-        _times(sheet, rows[n], spread)
+        _times(covariance, rows[n], spread)
         distance += misses[n] * misses[n] / (_dot(rows[n], spread) + variance)
     if distance > law[2]:
         return REFUSED
     shift = np.zeros(4)
     for n in range(2):
-        _times(sheet, rows[n], spread)
+        _times(covariance, rows[n], spread)
         scale = 1.0 / (_dot(rows[n], spread) + variance)
         step = scale * (misses[n] - _dot(rows[n], shift))
         for i in range(4):
             shift[i] += spread[i] * step
             for j in range(4):
-                sheet[i, j] -= scale * spread[i] * spread[j]
-    _shift(sheet, shift)
+                covariance[i, j] -= scale * spread[i] * spread[j]
+    _shift(estimate, shift)
     return ACCEPTED
 
 
 @compiled
-def _copy(covariance: Array, sheet: Array) -> None:
-    """Write P; element by element, as Numba compiles an assignment of slices for seconds."""
-    for i in range(4):
-        for j in range(4):
-            sheet[i, j] = covariance[i, j]
-
-
-@compiled
-def _shift(sheet: Array, shift: Array) -> None:
+def _shift(estimate: Array, shift: Array) -> None:
     """Move the estimate; ψ_s stays within ±π."""
     for i in range(3):
-        sheet[4, i] += shift[i]
-    axis_yaw = sheet[4, 3] + shift[3]
-    sheet[4, 3] = axis_yaw - _TAU * np.rint(axis_yaw / _TAU)
+        estimate[i] += shift[i]
+    axis_yaw = estimate[3] + shift[3]
+    estimate[3] = axis_yaw - _TAU * np.rint(axis_yaw / _TAU)
 
 
 @compiled
@@ -235,25 +223,23 @@ def _dot(a: Array, b: Array) -> float:
 
 
 @compiled
-def _times(sheet: Array, vector: Array, out: Array) -> None:
+def _times(covariance: Array, vector: Array, out: Array) -> None:
     """P times a vector (4,), into `out`."""
     for i in range(4):
-        out[i] = _dot(sheet[i], vector)
+        out[i] = _dot(covariance[i], vector)
 
 
 @compiled
-def _moved(covariance: Array, by_turn_x: float, by_turn_y: float, process: Array) -> Array:
-    """F P Fᵀ + diag(process) (4, 4) with F = 1 but for what a turn of the axis does to x and y, F₀₃ and F₁₃."""
-    moved = covariance.copy()
+def _move(covariance: Array, by_turn_x: float, by_turn_y: float, process: Array) -> None:
+    """P ← F P Fᵀ + diag(process) with F = 1 but for what a turn of the axis does to x and y, F₀₃ and F₁₃."""
     for j in range(4):
-        moved[0, j] += by_turn_x * covariance[3, j]
-        moved[1, j] += by_turn_y * covariance[3, j]
+        covariance[0, j] += by_turn_x * covariance[3, j]
+        covariance[1, j] += by_turn_y * covariance[3, j]
     for i in range(4):
-        turned = moved[i, 3]
-        moved[i, 0] += by_turn_x * turned
-        moved[i, 1] += by_turn_y * turned
-        moved[i, i] += process[i]
-    return moved
+        turned = covariance[i, 3]
+        covariance[i, 0] += by_turn_x * turned
+        covariance[i, 1] += by_turn_y * turned
+        covariance[i, i] += process[i]
 
 
 @compiled

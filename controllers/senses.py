@@ -78,7 +78,9 @@ def read_senses(proprioception: Proprioception) -> Senses:
     depth, time = proprioception.depth_m, proprioception.time_s
     euler = proprioception.euler_zyx_rad
     yaw = float(euler[2])
-    motion = _motion(
+    motion = np.empty(20)
+    _motion(
+        motion,
         euler,
         proprioception.angular_velocity_rad_s,
         proprioception.velocity_ground_m_s,
@@ -95,9 +97,8 @@ def read_senses(proprioception: Proprioception) -> Senses:
 
 
 @compiled
-def _motion(euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array) -> Array:
-    """`Senses.motion`; the rotation is Ry(pitch) Rx(roll), as `transforms.rotation_from_euler_zyx` without yaw."""
-    motion = np.empty(20)
+def _motion(motion: Array, euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array) -> None:
+    """Write `Senses.motion`, its rotation Ry(pitch) Rx(roll) as `transforms.rotation_from_euler_zyx` without yaw."""
     motion[0], motion[1] = euler_rad[0], euler_rad[1]
     for i in range(3):
         motion[2 + i], motion[5 + i], motion[8 + i] = rate_rad_s[i], ground_m_s[i], water_m_s[i]
@@ -109,7 +110,6 @@ def _motion(euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: A
     motion[11], motion[12], motion[13] = cp, sp * sr, sp * cr
     motion[14], motion[15], motion[16] = 0.0, cr, -sr
     motion[17], motion[18], motion[19] = -sp, cp * sr, cp * cr
-    return motion
 
 
 @compiled

@@ -118,6 +118,7 @@ class Place(NamedTuple):
         up_m: above the axis.
         axis_yaw_rad: compass heading of a vehicle that flies straight in.
         offset_rad: heading relative to that, positive to port.
+        off_axis_m: distance from the axis.
     """
 
     distance_m: float
@@ -125,11 +126,7 @@ class Place(NamedTuple):
     up_m: float
     axis_yaw_rad: float
     offset_rad: float
-
-    @property
-    def off_axis_m(self) -> float:
-        """Distance from the axis."""
-        return math.hypot(self.port_m, self.up_m)
+    off_axis_m: float
 
 
 class Steering(NamedTuple):
@@ -246,14 +243,14 @@ def along_axis(
         current_m_s: in world axes.
         law: from `guidance.axis_law`.
     """
-    distance, port, up, course, _ = place
+    distance, port, up, course, _, off_axis = place
     turn = math.remainder(senses.yaw_rad - course, math.tau)
     surge, sway, heave, offset, port_integral, up_integral = axis_course(
         law,
         distance,
         port,
         up,
-        place.off_axis_m,
+        off_axis,
         course,
         integrals[0],
         integrals[1],

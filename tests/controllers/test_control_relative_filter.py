@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from auvdock.controllers.relative_update import _fused, _moved
+from auvdock.controllers.relative_update import _fused, _move
 
 
 def spread(rng, size):
@@ -16,9 +16,9 @@ def test_prediction_is_f_p_ft_plus_q():
     covariance, process = spread(rng, 4), rng.random(4)
     move = np.eye(4)
     move[:2, 3] = 0.3, -0.7
-    assert _moved(covariance, 0.3, -0.7, process) == pytest.approx(
-        move @ covariance @ move.T + np.diag(process), rel=1e-12
-    )
+    expected = move @ covariance @ move.T + np.diag(process)
+    _move(covariance, 0.3, -0.7, process)
+    assert covariance == pytest.approx(expected, rel=1e-12)
 
 
 def test_update_is_the_kalman_filters():
