@@ -158,12 +158,9 @@ class Candidates(NamedTuple):
 
     Attributes:
         pixels: (m, 2) positions.
-        contrast_dn: (m,) code at the centre above the code of its surroundings, in the light's brightest channel.
-        surround_dn: (m,) code of those surroundings.
-        noise_dn: (m,) standard deviation of the code there.
-        radius_px: (m,) radius of the saturated disc, 0 without one.
-        width_px: (m,) width of the spot.
-        flux: (m,) weight of the light in a merged centre.
+        levels: (6, m) code at the centre above the code of its surroundings, in the light's brightest channel; code of
+            those surroundings; standard deviation of the code there; radius of the saturated disc in px, 0 without one;
+            width of the spot in px; weight of the light in a merged centre. Each row has a name of its own, too.
         distance2_px2: (m, m) squared distances between them.
         red: (m,) whether red is its brightest channel: class `RED` (1), else `BLUE` (0).
         flash: the rotating beacon among them, None if it is not in view.
@@ -172,17 +169,42 @@ class Candidates(NamedTuple):
     """
 
     pixels: Array
-    contrast_dn: Array
-    surround_dn: Array
-    noise_dn: Array
-    radius_px: Array
-    width_px: Array
-    flux: Array
+    levels: Array
     distance2_px2: Array
     red: BoolArray
     flash: Flash | None = None
     light_e_s: Array | None = None
     light_noise_e_s: Array | None = None
+
+    @property
+    def contrast_dn(self) -> Array:
+        """(m,) code at the centre above that of the surroundings."""
+        return self.levels[0]
+
+    @property
+    def surround_dn(self) -> Array:
+        """(m,) code of the surroundings."""
+        return self.levels[1]
+
+    @property
+    def noise_dn(self) -> Array:
+        """(m,) standard deviation of the code at the centre."""
+        return self.levels[2]
+
+    @property
+    def radius_px(self) -> Array:
+        """(m,) radius of the saturated disc."""
+        return self.levels[3]
+
+    @property
+    def width_px(self) -> Array:
+        """(m,) width of the spot."""
+        return self.levels[4]
+
+    @property
+    def flux(self) -> Array:
+        """(m,) weight in a merged centre."""
+        return self.levels[5]
 
 
 def load_detection_model(name: str) -> DetectionModelCfg:
@@ -205,32 +227,27 @@ def draw_detections(
         size_px: width and height of the image.
         rng: source of the draws.
     """
-    counts = crowded(seen.surround_dn, seen.contrast_dn, seen.distance2_px2, seen.radius_px, model.numbers)
+    counts = crowded(seen.levels, seen.distance2_px2, model.numbers)
     return draw_among(seen, counts, model, size_px, rng)
 
 
 def draw_among(
     seen: Candidates,
-    counts: tuple[float, bool],
+    counts: tuple[int, bool],
     model: DetectionModelCfg,
     size_px: tuple[int, int],
     rng: np.random.Generator,
 ) -> Detections:
     """As `draw_detections`, where it is known how many lights are veiled and whether any two are too close."""
-    (hidden, near), m = counts, len(seen.flux)
+    (hidden, near), m = counts, len(seen.pixels)
     chance, noise = rng.random((2, m)), rng.standard_normal((m, 2))
     rate = model.false_alarms * hidden / max(m, 1)
     alarms = rng.poisson(rate) if rate > 0.0 else 0
     merged = merge_close(seen, model) if near else seen
-    contrast = merged.contrast_dn
     flash, ways = seen.flash, model.flash or _FLASH
     index, centre, xyxy, score, class_id = _drawn(
         merged.pixels,
-        contrast,
-        merged.surround_dn,
-        merged.noise_dn,
-        merged.width_px,
-        merged.radius_px,
+        merged.levels,
         merged.red,
         noise,
         chance,
@@ -240,7 +257,7 @@ def draw_among(
     if flash is not None and flash.place in index:
         place = int(np.flatnonzero(index == flash.place)[0])
         half = np.maximum(0.5 * (xyxy[place, 2:] - xyxy[place, :2]), ways.box_scale * flash.half_px)
-        noise_over_contrast = 10.0 * float(merged.noise_dn[flash.place] / contrast[flash.place])
+        noise_over_contrast = 10.0 * float(merged.noise_dn[flash.place] / merged.contrast_dn[flash.place])
         spread_px = ways.centre_spread * noise_over_contrast * float(half.mean())
         centre[place] += ways.centre_shift * flash.shift_px + spread_px * rng.standard_normal(2)
         xyxy[place, :2], xyxy[place, 2:] = centre[place] - half, centre[place] + half
@@ -264,11 +281,7 @@ def draw_among(
 @compiled
 def _drawn(
     pixels: Array,
-    contrast: Array,
-    surround: Array,
-    noise_dn: Array,
-    width_px: Array,
-    radius_px: Array,
+    levels: Array,
     red: BoolArray,
     noise: Array,
     chance: Array,
@@ -279,6 +292,7 @@ def _drawn(
 
     `flash` is the rotating beacon's place, -1 for none; `model` is `DetectionModelCfg.numbers`.
     """
+    contrast, surround, noise_dn, radius_px, width_px = levels[0], levels[1], levels[2], levels[3], levels[4]
     contrast_50, surround_factor, slope, ceiling = model[0], model[1], model[2], model[3]
     found, count = np.empty(len(contrast), dtype=np.int64), 0
     for i in range(len(contrast)):
@@ -314,7 +328,7 @@ def _drawn(
 
 def veiled_share(seen: Candidates) -> float:
     """Share of lights whose surroundings outshine their contrast by 50 codes or more."""
-    return veiled(seen.surround_dn, seen.contrast_dn) / max(len(seen.flux), 1)
+    return veiled(seen.levels) / max(len(seen.pixels), 1)
 
 
 def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
@@ -324,8 +338,8 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
     """
     m = len(seen.flux)
     too_near = close(seen.distance2_px2, seen.radius_px, model.numbers)
-    pixels, contrast, flux = seen.pixels.copy(), seen.contrast_dn.copy(), seen.flux.copy()
-    radius = seen.radius_px.copy()
+    pixels, levels = seen.pixels.copy(), seen.levels.copy()
+    contrast, radius, flux = levels[0], levels[3], levels[5]
     lead = list(range(m))
     for i in range(m):
         for j in range(i + 1, m):
@@ -347,7 +361,7 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
         for k in members:
             if k != first:
                 contrast[k] = 0.0
-    return seen._replace(pixels=pixels, contrast_dn=contrast, radius_px=radius, flux=flux)
+    return seen._replace(pixels=pixels, levels=levels)
 
 
 def _root(lead: list[int], i: int) -> int:

@@ -124,7 +124,8 @@ def with_flash(
     around_e = float(others.sum() - others[k]) * exposure_s
     top = _top(lines, electrons_s[k] * exposure_s, around_e, lit.spots.radii_px, scale, ways)
     flash, contrast_dn, background_dn = top
-    contrast, surround, pixels = seen.contrast_dn.copy(), seen.surround_dn.copy(), seen.pixels.copy()
+    levels, pixels = seen.levels.copy(), seen.pixels.copy()
+    contrast, surround = levels[0], levels[1]
     # To a detector the flash and what lies within it are one light; so are a bright light and a flash within that.
     reach_px = np.maximum(float(np.mean(flash.half_px)), 2.0 * seen.radius_px)
     part = seen.distance2_px2[k] < reach_px**2
@@ -145,9 +146,7 @@ def with_flash(
         if contrast[lead] < contrast_dn:
             contrast[lead] = contrast_dn
             flash = flash._replace(place=lead)
-    return seen._replace(
-        pixels=pixels, contrast_dn=contrast, surround_dn=surround, flash=flash, light_e_s=light, light_noise_e_s=noise
-    )
+    return seen._replace(pixels=pixels, levels=levels, flash=flash, light_e_s=light, light_noise_e_s=noise)
 
 
 def _top(

@@ -296,11 +296,11 @@ def contrast(own: Array, around: Array, scale: Array) -> tuple[Array, Array, Arr
 
 
 @compiled
-def veiled(surround: Array, contrast: Array) -> int:
-    """How many of the lights (m,) have surroundings that outshine their contrast by 50 codes or more."""
+def veiled(levels: Array) -> int:
+    """How many of the lights `levels` (6, m) have surroundings that outshine their contrast by 50 codes or more."""
     count = 0
-    for i in range(len(contrast)):
-        if surround[i] > contrast[i] + _VEILED_DN:
+    for i in range(levels.shape[1]):
+        if levels[1, i] > levels[0, i] + _VEILED_DN:
             count += 1
     return count
 
@@ -317,14 +317,14 @@ def close(distance2: Array, radius: Array, model: Array) -> BoolArray:
 
 
 @compiled
-def crowded(surround: Array, contrast_dn: Array, distance2: Array, radius: Array, model: Array) -> tuple[int, bool]:
-    """How many of the lights are veiled, and whether any two are too close to be told apart."""
-    near = close(distance2, radius, model)
-    for i in range(len(radius)):
+def crowded(levels: Array, distance2: Array, model: Array) -> tuple[int, bool]:
+    """How many of the lights `levels` (6, m) are veiled, and whether any two are too close to be told apart."""
+    near = close(distance2, levels[3], model)
+    for i in range(len(near)):
         for j in range(i):
             if near[i, j]:
-                return veiled(surround, contrast_dn), True
-    return veiled(surround, contrast_dn), False
+                return veiled(levels), True
+    return veiled(levels), False
 
 
 @compiled
@@ -345,7 +345,7 @@ def see(
     exposure_s: float,
     saturated_e: float,
     model: Array,
-) -> tuple[Array, Array, BoolArray, Array, Array]:
+) -> tuple[Array, Array, BoolArray, Array, float, int, bool]:
     """All of the above for a frame in which nothing but lamps, water and lens plays a part.
 
     Args:
@@ -368,8 +368,8 @@ def see(
 
     Returns:
         Of the lights on the sensor pixels (m, 2); contrast, surroundings, noise, radius, width and electrons (6, m);
-        whether they are red (m,); squared distances (m, m); saturated area in px², number of the veiled, and 1 if two
-        are too close to be told apart (3,).
+        whether they are red (m,); squared distances (m, m); saturated area in px², number of the veiled, and whether
+        any two are too close to be told apart.
     """
     ray, parts = received(T_station_camera, lamps, behind, rim)
     place, inside = located(ray, lens)
@@ -389,12 +389,10 @@ def see(
         profile, channels, pixels, ring_px2, spacing, exposure_s, saturated_e
     )
     contrast_dn, surround, noise = contrast(own, around, scale)
-    hidden, near = crowded(surround, contrast_dn, distance2, radius, model)
-    seen, red = np.empty((6, count)), np.empty(count, dtype=np.bool_)
+    levels, red = np.empty((6, count)), np.empty(count, dtype=np.bool_)
     for k in range(count):
-        seen[0, k], seen[1, k], seen[2, k] = contrast_dn[k], surround[k], noise[k]
-        seen[3, k], seen[4, k], seen[5, k] = radius[k], sigma[k], own[k]
+        levels[0, k], levels[1, k], levels[2, k] = contrast_dn[k], surround[k], noise[k]
+        levels[3, k], levels[4, k], levels[5, k] = radius[k], sigma[k], own[k]
         red[k] = best[k] == 0
-    verdict = np.empty(3)
-    verdict[0], verdict[1], verdict[2] = area, hidden, 1.0 if near else 0.0
-    return pixels, seen, red, distance2, verdict
+    hidden, near = crowded(levels, distance2, model)
+    return pixels, levels, red, distance2, area, hidden, near

@@ -100,7 +100,7 @@ class BeaconSensor:
         lit, exposure = self.lit, self.exposure
         lights, spots, exposure_s = lit.lights, lit.spots, exposure.exposure_s
         scale = lit.scale(exposure.gain)
-        pixels, table, red, distance2, (area, hidden, near) = see(
+        pixels, levels, red, distance2, area, hidden, near = see(
             lit.station_camera(T_world_body),
             lights.lamps,
             lights.behind,
@@ -116,9 +116,8 @@ class BeaconSensor:
             self.model.numbers,
         )
         exposure.update(area / spots.samples)
-        contrast, surround, noise, radius, width, flux = table
-        seen = Candidates(pixels, contrast, surround, noise, radius, width, flux, distance2, red)
-        return draw_among(seen, (hidden, near > 0.0), self.model, self._size, self._rng)
+        seen = Candidates(pixels, levels, distance2, red)
+        return draw_among(seen, (hidden, near), self.model, self._size, self._rng)
 
 
 def candidates_in_view(
@@ -153,18 +152,8 @@ def candidates_in_view(
         veil = lit.veil_e_s(-float(view.T_world_camera[2, 3])) * exposure_s
         around += veil[met.channel]
         share += veil_share(veil, scale.saturated_e)
-    contrast, surround, noise = scale.contrast(met.own_e, around)
-    seen = Candidates(
-        pixels,
-        contrast,
-        surround,
-        noise,
-        met.radius_px,
-        spots.sigma_px,
-        met.own_e,
-        met.distance2_px2,
-        met.channel == _RED_CHANNEL,
-    )
+    levels = np.array([*scale.contrast(met.own_e, around), met.radius_px, spots.sigma_px, met.own_e])
+    seen = Candidates(pixels, levels, met.distance2_px2, met.channel == _RED_CHANNEL)
     if view.beam is not None:
         seen = with_flash(lit, spots, seen, scale, exposure_s, flash_model or FlashModelCfg())
     if view.flakes is None:
@@ -184,17 +173,14 @@ def _with_flakes(lit: LitScene, view: View, seen: Candidates, scale: SensorScale
     contrast = np.minimum(scale.codes(peak), 255.0)
     shown = np.flatnonzero(contrast > 2.0)
     pixels = np.concatenate([seen.pixels, flakes.pixels[shown]])
+    none = np.zeros(len(shown))
+    more = contrast[shown], none, scale.noise_dn(peak[shown]), none, sigma[shown], peak[shown]
     return Candidates(
         pixels,
-        np.concatenate([seen.contrast_dn, contrast[shown]]),
-        np.concatenate([seen.surround_dn, np.zeros(len(shown))]),
-        np.concatenate([seen.noise_dn, scale.noise_dn(peak[shown])]),
-        np.concatenate([seen.radius_px, np.zeros(len(shown))]),
-        np.concatenate([seen.width_px, sigma[shown]]),
-        np.concatenate([seen.flux, peak[shown]]),
+        np.concatenate([seen.levels, np.array(more)], axis=1),
         squared_distances(pixels),
         np.concatenate([seen.red, np.full(len(shown), best == 0)]),
         seen.flash,
         None if seen.light_e_s is None else np.concatenate([seen.light_e_s, peak[shown] / exposure_s]),
-        None if seen.light_noise_e_s is None else np.concatenate([seen.light_noise_e_s, np.zeros(len(shown))]),
+        None if seen.light_noise_e_s is None else np.concatenate([seen.light_noise_e_s, none]),
     )

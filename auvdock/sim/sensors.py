@@ -82,21 +82,21 @@ class Sensors:
     def sample(
         self,
         time_s: float,
-        depth_m: float,
+        z_world_m: float,
         euler_zyx_rad: Array,
         nu_body: Array,
         nu_relative_body: Array,
         switch_force_n: float,
         latched: bool,
     ) -> Proprioception:
-        """One sample of all sensors; angles (3,) in rad, velocities (6,) in m/s and rad/s."""
+        """One sample of all sensors; height (0 at the surface) in m, angles (3,), velocities (6,) in m/s and rad/s."""
         noise = self._rng.standard_normal(13)
         readings = _readings(
             self._bias, self._std, noise, euler_zyx_rad, nu_body, nu_relative_body, self._scale, self._datum_rad
         )
         return Proprioception(
             time_s=time_s,
-            depth_m=depth_m + float(readings[0]),
+            depth_m=float(readings[0]) - z_world_m,
             euler_zyx_rad=readings[1:4],
             angular_velocity_rad_s=readings[4:7],
             velocity_ground_m_s=readings[7:10],

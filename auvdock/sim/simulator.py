@@ -281,16 +281,12 @@ class Simulator:
 
     def proprioception(self) -> Proprioception:
         """One noisy sample of the vehicle's own sensors; draws from the sensors' generator."""
-        moving = self._motion()
-        pose = moving[:16].reshape(4, 4)
+        moving, force_n = self._motion(), 0.0
+        if self._contacts.force_n > 0.0:
+            pose = moving[:16].reshape(4, 4)
+            force_n = self._dock.switch_force_n(self._contacts, pose[:3, 3], pose[:3, :3])
         return self._sensors.sample(
-            time_s=self.time_s,
-            depth_m=-float(moving[11]),
-            euler_zyx_rad=moving[16:19],
-            nu_body=moving[22:28],
-            nu_relative_body=moving[28:34],
-            switch_force_n=self._dock.switch_force_n(self._contacts, pose[:3, 3], pose[:3, :3]),
-            latched=self._dock.latched,
+            self.time_s, float(moving[11]), moving[16:19], moving[22:28], moving[28:34], force_n, self._dock.latched
         )
 
     def _motion(self) -> Array:

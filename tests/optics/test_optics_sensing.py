@@ -64,12 +64,7 @@ def candidates(pixels, contrast, radius=0.0, around=0.0):
     ones = np.ones(m)
     return Candidates(
         places,
-        np.full(m, contrast, dtype=float),
-        around * ones,
-        0.7 * ones,
-        radius * ones,
-        ones,
-        ones,
+        np.array([contrast * ones, around * ones, 0.7 * ones, radius * ones, ones, ones]),
         squared_distances(places),
         np.zeros(m, dtype=bool),
     )
