@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from auvdock.controllers.planar_groups import add_planar, beyond_dead_band, least_planar, planar_groups
+from auvdock.controllers.planar_groups import add_planar, beyond_dead_band, least_planar, longest, planar_groups
 from auvdock.core.arrays import Array, check_shape
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import VehicleCfg
@@ -109,7 +108,7 @@ class ThrustAllocator:
         effect = surge_m_s * abs(surge_m_s)
         values, achieved, reached = np.empty(self._count), np.zeros(6), np.empty(len(self._groups))
         if not planar_groups(
-            values, achieved, reached, self._table, self._members, self._dead_band, wrench_body, effect
+            values, achieved, reached, self._table, self._members, self._dead_band, wrench_body, effect, moments_first
         ):
             wanted: list[float] = wrench_body.tolist()
             for group, is_done in zip(self._groups, reached.tolist(), strict=True):
@@ -236,11 +235,6 @@ def _components(full: Array, rows: list[int]) -> list[tuple[list[int], list[int]
 def _null_vector(effect: list[list[float]]) -> list[float] | None:
     """The commands that give no wrench, if there is one redundant actuator, else None."""
     count = len(effect[0])
-    if len(effect) == 2 and count == 3:
-        (a, b, c), (x, y, z) = effect
-        null = [b * z - c * y, c * x - a * z, a * y - b * x]
-        size = math.sqrt(null[0] * null[0] + null[1] * null[1] + null[2] * null[2])
-        return [part / size for part in null] if size > _TINY else None
     _, singular, rows = np.linalg.svd(np.array(effect))
     rank = int(np.sum(singular > _TINY * singular[0]))
     return rows[-1].tolist() if count - rank == 1 else None
@@ -293,32 +287,7 @@ def _longest_of_many(base: list[float], push: list[float], null: Array) -> tuple
 
 
 def _longest(base: list[float], push: list[float], null: list[float] | None) -> tuple[list[float], float]:
-    """Commands c with |c| ≤ 1 and B c = B (base + λ push), λ ≤ 1 as great as it goes; and λ.
-
-    With one redundant actuator all solutions are base + λ push + t n, n spanning the null space: a linear programme in
-    (λ, t), solved pair by pair of limits. Otherwise t is 0, which with more redundancy may fall short of the greatest
-    λ. `base` must be within reach.
-    """
-    reach = 1.0
-    lines: list[tuple[float, float, float]] = []
-    for index, (start, step) in enumerate(zip(base, push, strict=True)):
-        part = null[index] if null is not None else 0.0
-        if abs(part) > _TINY:
-            lines.append((1.0 / abs(part), start / part, step / part))
-        elif abs(start + reach * step) > 1.0 and step != 0.0:
-            reach = max(0.0, (math.copysign(1.0, step) - start) / step)
-    # Each moving command bounds t: -w <= b + λ s + t <= w with w = 1/|n|, b = base/n, s = push/n.
-    for width_i, base_i, slope_i in lines:
-        for width_j, base_j, slope_j in lines:
-            room, slope = width_i + width_j + base_i - base_j, slope_j - slope_i
-            if slope * reach > room:
-                reach = max(0.0, room / slope)
-    shift = 0.0
-    if lines:
-        low = max(-width - start - reach * slope for width, start, slope in lines)
-        high = min(width - start - reach * slope for width, start, slope in lines)
-        shift = min(max(0.0, low), high)
-    commands = [start + reach * step for start, step in zip(base, push, strict=True)]
-    if null is not None:
-        commands = [command + shift * part for command, part in zip(commands, null, strict=True)]
-    return [min(1.0, max(-1.0, command)) for command in commands], reach
+    """As `longest`, of lists; without a null vector t is 0, which may fall short of the greatest λ."""
+    commands, no_wrench = np.empty(len(base)), np.zeros(len(base)) if null is None else np.array(null)
+    reach = longest(np.array(base), np.array(push), no_wrench, commands)
+    return commands.tolist(), reach
