@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.assets import asset
-from auvdock.core.arrays import Array, BoolArray, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
+from auvdock.optics.detection_loop import drawn, merge, with_ghosts
 from auvdock.optics.light_loop import close, crowded, veiled
 
 __all__ = [
@@ -32,7 +32,6 @@ __all__ = [
     "veiled_share",
 ]
 
-_LEAST_DN = 1e-3
 _HAZE_PX = 20.0
 _GHOST_FLUX = 0.3
 """Flux of haze that breaks into spots, over that of the dimmest light (ours)."""
@@ -245,7 +244,7 @@ def draw_among(
     alarms = rng.poisson(rate) if rate > 0.0 else 0
     merged = merge_close(seen, model) if near else seen
     flash, ways = seen.flash, model.flash or _FLASH
-    index, centre, xyxy, score, class_id = _drawn(
+    index, centre, xyxy, score, class_id = drawn(
         merged.pixels,
         merged.levels,
         merged.red,
@@ -267,63 +266,15 @@ def draw_among(
         light = merged.light_e_s[index] * np.exp(ways.flux_spread * draws[0])
         flux = np.maximum(light + merged.light_noise_e_s[index] * draws[1], 0.0)
     if alarms:
-        ghosts = seen.pixels[rng.integers(0, m, alarms)] + rng.normal(0.0, _HAZE_PX, (alarms, 2))
-        ghosts = np.clip(ghosts, -0.5, np.array(size_px) - 0.5)
-        centre = np.concatenate([centre, ghosts])
-        xyxy = np.concatenate([xyxy, np.concatenate([ghosts - 2.0, ghosts + 2.0], axis=1)])
-        score = np.concatenate([score, rng.uniform(0.2, 0.5, alarms)])
-        class_id = np.concatenate([class_id, rng.integers(0, 2, alarms)])
+        # About the lights whose haze they are.
+        at, shift = rng.integers(0, m, alarms), rng.normal(0.0, _HAZE_PX, (alarms, 2))
+        looks, kinds = rng.uniform(0.2, 0.5, alarms), rng.integers(0, 2, alarms)
+        centre, xyxy, score, class_id = with_ghosts(
+            centre, xyxy, score, class_id, seen.pixels, at, shift, looks, kinds, *size_px
+        )
         if flux is not None:
             flux = np.concatenate([flux, np.full(alarms, _GHOST_FLUX * (float(flux.min()) if len(flux) else 1.0))])
     return Detections(xyxy, centre, score, class_id, flux)
-
-
-@compiled
-def _drawn(
-    pixels: Array,
-    levels: Array,
-    red: BoolArray,
-    noise: Array,
-    chance: Array,
-    flash: int,
-    model: Array,
-) -> tuple[IntArray, Array, Array, Array, IntArray]:
-    """Which lights (k,) of m the detector finds, brightest first; their centres (k, 2), boxes (k, 4), scores, classes.
-
-    `flash` is the rotating beacon's place, -1 for none; `model` is `DetectionModelCfg.numbers`.
-    """
-    contrast, surround, noise_dn, radius_px, width_px = levels[0], levels[1], levels[2], levels[3], levels[4]
-    contrast_50, surround_factor, slope, ceiling = model[0], model[1], model[2], model[3]
-    found, count = np.empty(len(contrast), dtype=np.int64), 0
-    for i in range(len(contrast)):
-        if contrast[i] <= _LEAST_DN:
-            continue
-        odds = ((contrast_50 + surround_factor * surround[i]) / contrast[i]) ** slope
-        if i == flash:
-            odds = (model[8] / contrast[i]) ** model[9]
-        if (1.0 + odds) * chance[0, i] >= ceiling:
-            continue
-        place = count
-        while place > 0 and contrast[found[place - 1]] < contrast[i]:
-            found[place] = found[place - 1]
-            place -= 1
-        found[place] = i
-        count += 1
-    index = found[:count]
-    centre_at_100, centre_floor_px, score_gain, wrong_colour = model[4], model[5], model[6], model[7]
-    centre, xyxy = np.empty((count, 2)), np.empty((count, 4))
-    score, class_id = np.empty(count), np.empty(count, dtype=np.int64)
-    for k in range(count):
-        i = index[k]
-        spread = math.hypot(width_px[i] * centre_at_100 * 1e4 / contrast[i] ** 2, centre_floor_px)
-        half = max(radius_px[i], width_px[i])
-        for axis in range(2):
-            centre[k, axis] = pixels[i, axis] + spread * noise[i, axis]
-            xyxy[k, axis], xyxy[k, 2 + axis] = centre[k, axis] - half, centre[k, axis] + half
-        snr = score_gain * contrast[i] / noise_dn[i]
-        score[k] = snr / (snr + 10.0)
-        class_id[k] = 1 if red[i] != (chance[1, i] < wrong_colour) else 0
-    return index, centre, xyxy, score, class_id
 
 
 def veiled_share(seen: Candidates) -> float:
@@ -336,35 +287,6 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
 
     Lights that have been merged into another keep their place with contrast 0.
     """
-    m = len(seen.flux)
-    too_near = close(seen.distance2_px2, seen.radius_px, model.numbers)
     pixels, levels = seen.pixels.copy(), seen.levels.copy()
-    contrast, radius, flux = levels[0], levels[3], levels[5]
-    lead = list(range(m))
-    for i in range(m):
-        for j in range(i + 1, m):
-            if too_near[i, j] and contrast[i] > 0.0 and contrast[j] > 0.0:
-                a, b = _root(lead, i), _root(lead, j)
-                if a != b:
-                    lead[max(a, b)] = min(a, b)
-    groups: dict[int, list[int]] = {}
-    for i in range(m):
-        groups.setdefault(_root(lead, i), []).append(i)
-    for members in groups.values():
-        if len(members) < 2:
-            continue
-        first = max(members, key=lambda k: float(seen.flux[k]))
-        weight = seen.flux[members]
-        pixels[first] = weight @ seen.pixels[members] / weight.sum()
-        flux[first] = weight.sum()
-        radius[first] = math.sqrt(float((seen.radius_px[members] ** 2).sum()))
-        for k in members:
-            if k != first:
-                contrast[k] = 0.0
+    merge(pixels, levels, close(seen.distance2_px2, seen.radius_px, model.numbers))
     return seen._replace(pixels=pixels, levels=levels)
-
-
-def _root(lead: list[int], i: int) -> int:
-    while lead[i] != i:
-        i = lead[i]
-    return i
