@@ -138,7 +138,7 @@ def spread(
         halo: (n,) irradiance of the scattered light in W/m².
         rows: (h, k) halo of unit light per pixel at the tabulated radii, by b r.
         table: (4,) where in it which b r is, see `rows_of`.
-        minus_half_r2: (k,) −½ of the radii's squares in px².
+        minus_half_r2: (k,) −½ of the radii's squares in px², the radii rising.
         widths: (2,) variance of the core in px² by the lens, and by the lamp's face at 1 m.
         channel: (n, 3) electrons per second for 1 W/m² on a pixel.
 
@@ -162,9 +162,11 @@ def spread(
         below, above = rows[row[i]], rows[row[i] + 1]
         for k in range(len(minus_half_r2)):
             profile[i, k] = (below[k] + weight[i] * (above[k] - below[k])) * halos[i]
+        for k in range(len(minus_half_r2)):
             exponent = minus_half_r2[k] / sigma2
-            if exponent > _LEAST_EXPONENT:
-                profile[i, k] += peak * math.exp(exponent)
+            if exponent <= _LEAST_EXPONENT:
+                break
+            profile[i, k] += peak * math.exp(exponent)
     return cores, halos, sigma, profile, channels
 
 

@@ -51,6 +51,10 @@ class SensorCfg:
                 raise ConfigError(f"sim.sensors.{name}", value, "0 or more")
 
 
+_BLOCK = 64
+"""Samples whose noise is drawn at once: one call of the generator costs as much as the numbers of one sample."""
+
+
 class Sensors:
     """Draws what the sensors say from the true state."""
 
@@ -77,26 +81,30 @@ class Sensors:
         self._rng = rng
         self._datum_rad = compass_datum_rad
         self._bias = self._bias_std * rng.standard_normal(13)
+        self._noise, self._row = np.zeros((0, 13)), _BLOCK
         self._scale = 1.0 + self._cfg.velocity_scale_error * float(rng.standard_normal())
 
     def sample(
         self,
         time_s: float,
-        z_world_m: float,
+        depth_m: float,
         euler_zyx_rad: Array,
         nu_body: Array,
         nu_relative_body: Array,
         switch_force_n: float,
         latched: bool,
     ) -> Proprioception:
-        """One sample of all sensors; height (0 at the surface) in m, angles (3,), velocities (6,) in m/s and rad/s."""
-        noise = self._rng.standard_normal(13)
+        """One sample of all sensors; depth in m, angles (3,) in rad, velocities (6,) in m/s and rad/s."""
+        if self._row == _BLOCK:
+            self._noise, self._row = self._rng.standard_normal((_BLOCK, 13)), 0
+        noise = self._noise[self._row]
+        self._row += 1
         readings = _readings(
             self._bias, self._std, noise, euler_zyx_rad, nu_body, nu_relative_body, self._scale, self._datum_rad
         )
         return Proprioception(
             time_s=time_s,
-            depth_m=float(readings[0]) - z_world_m,
+            depth_m=depth_m + float(readings[0]),
             euler_zyx_rad=readings[1:4],
             angular_velocity_rad_s=readings[4:7],
             velocity_ground_m_s=readings[7:10],

@@ -286,7 +286,7 @@ class Simulator:
             pose = moving[:16].reshape(4, 4)
             force_n = self._dock.switch_force_n(self._contacts, pose[:3, 3], pose[:3, :3])
         return self._sensors.sample(
-            self.time_s, float(moving[11]), moving[16:19], moving[22:28], moving[28:34], force_n, self._dock.latched
+            self.time_s, -float(moving[11]), moving[16:19], moving[22:28], moving[28:34], force_n, self._dock.latched
         )
 
     def _motion(self) -> Array:

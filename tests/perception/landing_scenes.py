@@ -87,7 +87,7 @@ class Senses:
         nu = np.concatenate([velocity, omega])
         roll, pitch, yaw = euler.tolist()
         depth = STATION.depth_m - float(position[2])
-        return self.sensors.sample(time_s, depth, (roll, pitch, yaw), nu, nu, 0.0, False)
+        return self.sensors.sample(time_s, depth, np.array([roll, pitch, yaw]), nu, nu, 0.0, False)
 
     def lights(self, time_s: float, dead: tuple[int, ...] = (), spurious_n: int = 0) -> Detections:
         """The lights in view but the dead ones, and spots that are none, shuffled."""

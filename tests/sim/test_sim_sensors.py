@@ -23,7 +23,7 @@ NU_RELATIVE = np.array([0.4, 0.2, -0.05, 0.01, 0.02, 0.1])
 
 
 def sample(sensors: Sensors) -> Proprioception:
-    return sensors.sample(1.0, -8.0, EULER, NU, NU_RELATIVE, 0.0, False)
+    return sensors.sample(1.0, 8.0, EULER, NU, NU_RELATIVE, 0.0, False)
 
 
 def stacked(sensed: Proprioception) -> Array:
