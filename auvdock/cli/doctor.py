@@ -106,7 +106,7 @@ def _onnx() -> str:
 
 def _compiled_loops() -> Check:
     folder = cache_folder(components)
-    remedy = "" if folder else "they are compiled anew in every process, some 20 s: set NUMBA_CACHE_DIR"
+    remedy = "" if folder else "they are compiled anew in every process, up to a minute: set NUMBA_CACHE_DIR"
     return Check("compiled loops", folder is not None, False, f"kept in {folder}" if folder else "not kept", remedy)
 
 

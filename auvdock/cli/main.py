@@ -90,7 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _tell_of_compiling() -> None:
-    print("auvdock: compiling inner loops, once after an installation: some 20 s", file=sys.stderr, flush=True)
+    print("auvdock: compiling inner loops, once after an installation: up to a minute", file=sys.stderr, flush=True)
 
 
 def _find(words: Sequence[str]) -> tuple[str, ...] | None:

@@ -43,7 +43,7 @@ class SweepProgress:
             columns = (BarColumn(30), TextColumn("{task.description}"))
             self._progress = Progress(*columns, console=self._console, transient=True)
             self._progress.add_task(
-                "starting; a new installation first compiles, some 20 s", total=planned, completed=tally.episodes
+                "starting; a new installation first compiles, up to a minute", total=planned, completed=tally.episodes
             )
             self._progress.start()
 
