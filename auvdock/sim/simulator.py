@@ -198,9 +198,15 @@ class Simulator:
 
         Does nothing once diverged.
 
+        Args:
+            command: held over all of the steps.
+            steps: how many.
+
         Raises:
             ValueError: a command of the wrong length or with values that are not numbers.
         """
+        if self._diverged:
+            return
         values = self._actuators.checked(command)
         while steps > 0 and not self._diverged:
             moving = np.empty(MOTION)
