@@ -14,6 +14,7 @@ from auvdock.core.camera import Camera
 from auvdock.core.contracts import Percept
 from auvdock.core.transforms import invert
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.episode.false_poses import FalsePoses
 from auvdock.episode.trace import Tick
 from auvdock.perception.landing.pipeline import LandingPercept
 from auvdock.sim.truth import Truth
@@ -37,6 +38,7 @@ class LandingMetrics:
 
     def __init__(self, camera: Camera, vehicle: VehicleCfg, T_world_station: Array) -> None:
         """Start empty."""
+        self._T_body_camera = camera.T_body_camera
         self._T_camera_body = invert(camera.T_body_camera)
         self._seat_body = np.append(vehicle.seat_body_m, 1.0)
         self._T_station_world = invert(T_world_station)
@@ -44,6 +46,8 @@ class LandingMetrics:
         self._entry_m: float | None = None
         self._last_m: float | None = None
         self._pose_errors_m: list[float] = []
+        self._camera_errors_m: list[float] = []
+        self._camera_ranges_m: list[float] = []
         self._aligned = False
         self._flown: list[tuple[float, float]] = []
         self._estimated: list[tuple[float, float]] = []
@@ -85,6 +89,7 @@ class LandingMetrics:
             "entry_distance_m": entry_m,
             "precise_range_m": None if entry_m is None or last_m is None else entry_m - last_m,
             "pose_error_median_m": float(np.median(self._pose_errors_m)) if self._pose_errors_m else None,
+            **vars(FalsePoses.count(self._camera_errors_m, self._camera_ranges_m)),
             "lateral_error_m": None,
             "vertical_error_m": None,
             "heading_error_rad": None,
@@ -122,6 +127,10 @@ class LandingMetrics:
             self._entry_m = truth.range_m if self._entry_m is None else self._entry_m
             self._last_m = truth.range_m
             self._pose_errors_m.append(float(np.linalg.norm(error[:3])))
+            camera_m = (self._T_station_world @ truth.T_world_body @ self._T_body_camera)[:3, 3]
+            error_m = np.linalg.norm(percept.pose.T_station_camera[:3, 3] - camera_m)
+            self._camera_errors_m.append(float(error_m))
+            self._camera_ranges_m.append(float(np.linalg.norm(camera_m)))
         if counts:
             self._estimated.append((float(np.abs(error[:3]).max()), abs(float(error[3]))))
 

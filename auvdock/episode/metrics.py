@@ -11,6 +11,7 @@ from auvdock.core.camera import Camera
 from auvdock.core.contracts import Percept
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.transforms import invert
+from auvdock.episode.false_poses import FalsePoses
 from auvdock.sim.truth import Truth
 
 __all__ = ["GuidanceMetrics", "GuidanceSummary"]
@@ -26,6 +27,9 @@ class GuidanceSummary:
     entry_distance_m: float | None
     precise_range_m: float | None
     pose_error_median_m: float | None
+    measured_poses: int
+    false_poses: int
+    false_pose_rate: float | None
 
 
 class GuidanceMetrics:
@@ -64,10 +68,13 @@ class GuidanceMetrics:
     def summary(self) -> GuidanceSummary:
         """The metrics so far."""
         entry_m = last_m = error_m = None
+        poses = FalsePoses.count((), ())
         if self._true_m:
             camera_m = np.array(self._true_m) @ self._T_station_world[:3].T
             entry_m, last_m = float(camera_m[0, 0]), float(camera_m[-1, 0])
-            error_m = float(np.median(np.linalg.norm(np.array(self._measured_m) - camera_m, axis=1)))
+            errors_m = np.linalg.norm(np.array(self._measured_m) - camera_m, axis=1)
+            error_m = float(np.median(errors_m))
+            poses = FalsePoses.count(errors_m, np.linalg.norm(camera_m, axis=1))
         invalid = self._invalid_frames()
         precise = len(self._true_m) + invalid
         return GuidanceSummary(
@@ -77,6 +84,7 @@ class GuidanceMetrics:
             entry_distance_m=entry_m,
             precise_range_m=None if entry_m is None or last_m is None else entry_m - last_m,
             pose_error_median_m=error_m,
+            **vars(poses),
         )
 
     def _invalid_frames(self) -> int:

@@ -81,6 +81,13 @@ class EpisodeResult:
     """Speed along the axis as the nose crosses the throat."""
     pose_error_median_m: float | None
     """Median distance between measured and true camera position in precise guidance."""
+    measured_poses: int
+    """Poses measured in this very frame, until the latch closes."""
+    false_poses: int
+    """Those of them whose camera position is off by more than 0.3 m and by more than 10 % of the range
+    (`auvdock.episode.false_poses`)."""
+    false_pose_rate: float | None
+    """false_poses / measured_poses; None if no pose was measured."""
     attempts: int
     """Approaches begun; 1 means no go-around."""
     seed: int

@@ -41,6 +41,7 @@ def _entry_rows(result: EpisodeResult) -> list[tuple[str, str]]:
         ("Entry distance", _quantity(result.entry_distance_m, "m", 2)),
         ("Range of precise guidance", _quantity(result.precise_range_m, "m", 2)),
         ("Median pose error", _quantity(result.pose_error_median_m, "m", 3)),
+        ("False poses", _share(result.false_pose_rate, result.false_poses, result.measured_poses)),
         ("Lateral error at the throat", _quantity(result.lateral_error_m, "m", 3)),
         ("Vertical error at the throat", _quantity(result.vertical_error_m, "m", 3)),
         ("Heading error at the throat", _quantity(_degrees(result.heading_error_rad), "°", 1)),
@@ -54,6 +55,7 @@ def _landing_rows(result: EpisodeResult) -> list[tuple[str, str]]:
     return [
         ("Range of the first pose", _quantity(result.entry_distance_m, "m", 2)),
         ("Frames by lights / tag / both / neither", shares),
+        ("False poses", _share(result.false_pose_rate, result.false_poses, result.measured_poses)),
         ("Position error at the latch", _quantity(result.final_position_error_m, "m", 4)),
         ("Greatest after alignment", _quantity(result.max_position_error_m, "m", 4)),
         ("Heading error at the latch", _quantity(_degrees(result.final_heading_error_rad), "°", 2)),

@@ -41,6 +41,7 @@ CAUSES = {
 
 DISTRIBUTIONS = (
     ("distortion_rate", "distortion rate, %", 100.0),
+    ("false_pose_rate", "false poses, %", 100.0),
     ("entry_distance_m", "entry distance, m", 1.0),
     ("time_s", "time, s", 1.0),
     ("energy_j", "energy, kJ", 1e-3),

@@ -105,8 +105,15 @@ def _headline(campaign: Campaign) -> str:
         (f"{100 * rate.low:.1f} to {100 * rate.high:.1f} %", "Wilson 95 % interval"),
         (str(rate.episodes), "episodes"),
         (str(rate.episodes - rate.successes), "failures"),
+        *_false_poses(campaign.rows),
     ]
     return '<ul class="figures">' + "".join(f"<li><b>{value}</b>{name}</li>" for value, name in items) + "</ul>"
+
+
+def _false_poses(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    measured = sum(int(row["measured_poses"] or 0) for row in rows)
+    false = sum(int(row["false_poses"] or 0) for row in rows)
+    return [(f"{false} of {measured}", "false among the measured poses")] if measured else []
 
 
 def _map(campaign: Campaign) -> str:

@@ -14,6 +14,9 @@ from auvdock.episode.result import FAILURE_REASONS
 
 __all__ = ["csv_table", "latex_table"]
 
+TOTALS = ("measured_poses", "false_poses")
+"""Columns whose sum the CSV gives."""
+
 MEDIANS = (
     *("distortion_rate", "entry_distance_m", "time_s", "energy_j", "peak_contact_force_n"),
     *("touchdown_speed_m_s", "final_position_error_m", "final_heading_error_rad"),
@@ -22,25 +25,27 @@ MEDIANS = (
 
 
 def csv_table(campaign: Campaign) -> str:
-    """One line per cell of all axes: counts, rate, Wilson 95 % interval, medians, failures by cause."""
+    """One line per cell of all axes: counts, rate, Wilson 95 % interval, sums, medians, failures by cause."""
     cuts = [binning(axis) for axis in campaign.cfg.axes]
     cells: dict[tuple[int, ...], list[Row]] = defaultdict(list)
     for row in campaign.rows:
         cells[tuple(cut.place(row[cut.name] or 0) for cut in cuts)].append(row)
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
+    totals = [f"total_{name}" for name in TOTALS]
     medians = [f"median_{name}" for name in MEDIANS]
     causes = [f"failed_{name}" for name in FAILURE_REASONS]
     names = [cut.name for cut in cuts]
-    writer.writerow([*names, "episodes", "successes", "success_rate", "ci_low", "ci_high", *medians, *causes])
+    writer.writerow([*names, "episodes", "successes", "success_rate", "ci_low", "ci_high", *totals, *medians, *causes])
     for places, rows in sorted(cells.items()):
         rate = rate_of(rows)
         ticks = [cut.ticks[place] for cut, place in zip(cuts, places, strict=True)]
+        summed = [sum(int(row[name] or 0) for row in rows) for name in TOTALS]
         middle = [_median(rows, name) for name in MEDIANS]
         failed = [sum(row["failure_reason"] == name for row in rows) for name in FAILURE_REASONS]
         share = "" if rate.rate is None else f"{rate.rate:.6g}"
         interval = (f"{rate.low:.6g}", f"{rate.high:.6g}")
-        writer.writerow([*ticks, rate.episodes, rate.successes, share, *interval, *middle, *failed])
+        writer.writerow([*ticks, rate.episodes, rate.successes, share, *interval, *summed, *middle, *failed])
     return buffer.getvalue()
 
 
