@@ -7,10 +7,10 @@ import pytest
 
 from auvdock.core.contracts import Detections, Percept, PoseEstimate
 from auvdock.core.transforms import invert
+from auvdock.envs.world import DockingWorld
 from auvdock.episode.config import level_cfg
 from auvdock.episode.false_poses import FalsePoses, is_false
 from auvdock.episode.metrics import GuidanceMetrics
-from auvdock.envs.world import DockingWorld
 
 
 def test_near_the_station_the_bound_is_0_3_m_and_far_away_a_tenth_of_the_range():
