@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 
 from auvdock.core.beacons import BeaconCfg
 from auvdock.core.camera import CameraCfg
+from auvdock.core.checks import check_range
 from auvdock.core.errors import ConfigError
 from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.station import ConicalStationCfg, load_conical_station
+from auvdock.envs.room import hull_room
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.sim.simulator import SimCfg
@@ -51,6 +53,7 @@ class StartCfg:
         """Refuse impossible starts."""
         if not 2.0 <= self.min_range_m <= self.max_range_m:
             raise ConfigError("world.start.min_range_m", self.min_range_m, "2 m or more and at most max_range_m")
+        check_range("world.start.max_range_m", self.max_range_m, 0.0, math.inf, "a finite distance")
         if not 0.0 <= self.azimuth_deg <= 180.0:
             raise ConfigError("world.start.azimuth_deg", self.azimuth_deg, "0 to 180 degrees")
         for name in ("lateral_m", "vertical_m", "heading_deg"):
@@ -66,10 +69,14 @@ class LimitsCfg:
     """Simulated time."""
     collision_force_n: float = 2000.0
     """A contact harder than this ends the episode as `collision`."""
+    surfaced_s: float = 5.0
+    """Once some of the hull has been out of the water for this long in all, the episode ends as `surfaced`."""
+    carried_off_m: float = 200.0
+    """Once the vehicle is this much further from the station than at the start, the episode ends as `carried_off`."""
 
     def __post_init__(self) -> None:
         """Refuse limits that end every episode at once."""
-        for name in ("max_time_s", "collision_force_n"):
+        for name in ("max_time_s", "collision_force_n", "surfaced_s", "carried_off_m"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"world.limits.{name}", getattr(self, name), "a number above 0")
 
@@ -114,6 +121,44 @@ class WorldCfg:
         if self.fidelity not in FIDELITIES:
             raise ConfigError("fidelity", self.fidelity, f"one of {', '.join(FIDELITIES)}")
         check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
+        for index, light in enumerate(self.extra_lights):
+            low_m, high_m = -self.station.floor_below_m, self.station.depth_m
+            remedy = (
+                f"a height above the mouth's centre between the floor's, {low_m:g} m, and the surface's, {high_m:g} m"
+            )
+            check_range(f"world.extra_lights[{index}].position_m", light.position_m[2], low_m, high_m, remedy)
+        self._check_start()
+
+    def _check_start(self) -> None:
+        """Refuse starts of which some draw would lie out of the water, in the ground or in the station.
+
+        A start is level, with any heading.
+        """
+        start, station, room = self.start, self.station, hull_room(self.sim.vehicle)
+        up_m, down_m = station.depth_m - room.above_m, station.floor_below_m - room.below_m
+        if up_m <= 0.0:
+            raise ConfigError("world.station.depth_m", station.depth_m, f"more than {room.above_m:g} m for the vehicle")
+        if down_m <= 0.0:
+            raise ConfigError(
+                "world.station.floor_below_m", station.floor_below_m, f"more than {room.below_m:g} m for the vehicle"
+            )
+        if start.vertical_m > min(up_m, down_m):
+            raise ConfigError(
+                "world.start.vertical_m",
+                start.vertical_m,
+                f"at most {math.floor(1e3 * min(up_m, down_m)) / 1e3:g} m, so that the whole vehicle starts below the "
+                f"surface ({station.depth_m:g} m above the mouth's centre) and above the floor "
+                f"({station.floor_below_m:g} m below it)",
+            )
+        clear_m = room.around_m
+        if start.ring:
+            funnel = station.funnel
+            behind = start.azimuth_deg > 90.0
+            length_m = funnel.length_m + funnel.tube_length_m if behind else 0.0
+            clear_m += math.hypot(length_m, funnel.mouth_radius_m)
+        if start.min_range_m < clear_m:
+            remedy = f"{math.ceil(1e3 * clear_m) / 1e3:g} m or more, so that no start touches the station"
+            raise ConfigError("world.start.min_range_m", start.min_range_m, remedy)
 
 
 def check_rates(physics_hz: float, control_hz: float, camera_hz: float) -> None:

@@ -9,6 +9,7 @@ from auvdock.core.calibrated_camera import CalibratedCameraCfg
 from auvdock.core.errors import ConfigError
 from auvdock.core.landing_station import LandingStationCfg, load_landing_station
 from auvdock.envs.config import FIDELITIES, LimitsCfg, check_rates
+from auvdock.envs.room import hull_room
 from auvdock.optics.faults import FaultCfg
 from auvdock.optics.lamp import LampCfg
 from auvdock.optics.landing_camera import landing_imaging
@@ -79,10 +80,20 @@ class LandingWorldCfg:
             raise ConfigError(
                 "world.control_hz", self.control_hz, f"a multiple of the camera's {self.camera.rate_hz:g} Hz"
             )
-        highest_m = self.start.max_height_m + self.station.guide.seat_height_m
-        if highest_m > self.station.depth_m - 1.0:
+        self._check_start()
+
+    def _check_start(self) -> None:
+        """Refuse starts of which some draw would lie out of the water or in the guides; a start is level."""
+        start, guide, room = self.start, self.station.guide, hull_room(self.sim.vehicle)
+        most_m = self.station.depth_m - guide.seat_height_m - room.above_seat_m
+        least_m = guide.top_m - guide.seat_height_m + room.below_seat_m
+        if start.max_height_m > most_m:
             raise ConfigError(
                 "world.start.max_height_m",
-                self.start.max_height_m,
-                f"a start below the surface, the station lies {self.station.depth_m:g} m deep",
+                start.max_height_m,
+                f"at most {math.floor(1e3 * most_m) / 1e3:g} m, a start below the surface: the station lies "
+                f"{self.station.depth_m:g} m deep",
             )
+        if start.min_height_m < least_m:
+            remedy = f"{math.ceil(1e3 * least_m) / 1e3:g} m or more, a start above the guides"
+            raise ConfigError("world.start.min_height_m", start.min_height_m, remedy)

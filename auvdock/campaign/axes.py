@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ from scipy.special import ndtri
 
 from auvdock.core.errors import ConfigError
 
-__all__ = ["ALIASES", "DISTRIBUTIONS", "AxisCfg", "AxisValue", "nested", "parse_axis"]
+__all__ = ["ALIASES", "DISTRIBUTIONS", "AxisCfg", "AxisValue", "joint_changes", "nested", "parse_axis"]
 
 AxisValue = float | int | str | bool
 """What an axis can set."""
@@ -134,6 +134,14 @@ class AxisCfg:
         if self.name == "current_direction":
             result["world"].setdefault("start", {})["random_current_direction"] = False
         return result
+
+
+def joint_changes(axes: Sequence[AxisCfg], values: Sequence[AxisValue]) -> dict[str, Any]:
+    """What the axes together change of an episode's configuration: some values fit only beside one another's."""
+    changes: dict[str, Any] = {}
+    for axis, value in zip(axes, values, strict=True):
+        changes = _join(changes, axis.changes(value))
+    return changes
 
 
 def nested(field: str, value: object) -> dict[str, Any]:

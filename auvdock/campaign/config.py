@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
-from auvdock.campaign.axes import AxisCfg
+from auvdock.campaign.axes import AxisCfg, AxisValue, joint_changes
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import from_mapping, load_toml
 from auvdock.episode.config import LEVELS, AnyEpisodeCfg, landing_level_cfg, level_cfg
@@ -23,6 +24,7 @@ STATIONS: Mapping[str, Callable[[int], AnyEpisodeCfg]] = {
     "landing": landing_level_cfg,
 }
 """Stations that campaigns can dock into, and what an episode of a difficulty level is there."""
+_MOST_CORNERED = 6
 _LEAST_LIMIT_S, _TIMES_SIMULATED = 600.0, 5.0
 
 
@@ -72,12 +74,13 @@ class CampaignCfg:
         if len(set(names)) != len(names):
             raise ConfigError("axes", names, "each axis once")
         base = self.base(self.level)
-        for axis in self.axes:
-            ends = axis.grid or (axis.quantile(0.0), axis.quantile(1.0))
-            for value in ends:
+        ends = [axis.grid or (axis.quantile(0.0), axis.quantile(1.0)) for axis in self.axes]
+        for axis, values in zip(self.axes, ends, strict=True):
+            for value in values:
                 if axis.name == "level" and value not in LEVELS:
                     raise ConfigError("axes.level", value, f"one of {', '.join(map(str, LEVELS))}")
-                base.override(axis.changes(value))
+        for point in _points(ends):
+            base.override(joint_changes(self.axes, point))
 
     @property
     def wall_limit_s(self) -> float:
@@ -96,6 +99,15 @@ class CampaignCfg:
             ConfigError: no such level, or changes that do not fit.
         """
         return STATIONS[self.station](level).override(self.episode)
+
+
+def _points(ends: Sequence[Sequence[AxisValue]]) -> Iterable[tuple[AxisValue, ...]]:
+    """Places on the axes that have to be possible: every value once, and the corners where they are not too many."""
+    first = tuple(values[0] for values in ends)
+    points = [(*first[:place], value, *first[place + 1 :]) for place, values in enumerate(ends) for value in values]
+    if 1 < len(ends) <= _MOST_CORNERED:
+        points += product(*((values[0], values[-1]) for values in ends))
+    return dict.fromkeys(points)
 
 
 def load_campaign(path: Path) -> CampaignCfg:

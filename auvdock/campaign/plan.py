@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from auvdock.campaign.axes import AxisValue
+from auvdock.campaign.axes import AxisValue, joint_changes
 from auvdock.campaign.config import CampaignCfg
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
@@ -85,10 +85,8 @@ class Plan:
     def config(self, spec: EpisodeSpec) -> AnyEpisodeCfg:
         """The episode's configuration."""
         level = spec.point.get("level", self.cfg.level)
-        cfg = self.cfg.base(int(level))
-        for axis in self.cfg.axes:
-            cfg = cfg.override(axis.changes(spec.point[axis.name]))
-        return cfg
+        values = [spec.point[axis.name] for axis in self.cfg.axes]
+        return self.cfg.base(int(level)).override(joint_changes(self.cfg.axes, values))
 
     def _draw_design(self) -> Array | None:
         if not self._drawn or self.cfg.sampling == "random":

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.core.checks import check_above, check_finite
 from auvdock.core.errors import ConfigError
 
 __all__ = ["ROLES", "BeaconCfg", "BeaconLayout", "ring_layout"]
@@ -49,8 +50,9 @@ class BeaconCfg:
             raise ConfigError(f"{where}.role", self.role, f"one of {', '.join(ROLES)}")
         if not 380.0 <= self.wavelength_nm <= 720.0:
             raise ConfigError(f"{where}.wavelength_nm", self.wavelength_nm, "a visible wavelength of 380 to 720 nm")
-        if not self.power_w > 0.0:
-            raise ConfigError(f"{where}.power_w", self.power_w, "a power above 0 W")
+        check_finite(f"{where}.position_m", self.position_m, "three finite coordinates")
+        check_finite(f"{where}.axis", self.axis, "three finite components")
+        check_above(f"{where}.power_w", self.power_w, 0.0, "a power above 0 W")
         if not 0.0 < self.efficiency <= 1.0:
             raise ConfigError(f"{where}.efficiency", self.efficiency, "a fraction above 0 and up to 1")
         if not 0.5 <= self.beam_angle_deg <= 360.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from auvdock.core.checks import check_above, check_finite
 from auvdock.core.errors import ConfigError
 
 __all__ = ["BeaconClockCfg", "RotatingBeaconCfg"]
@@ -39,22 +40,25 @@ class RotatingBeaconCfg:
         """Refuse what no beacon can be."""
         if not 0.01 <= self.rate_rev_s <= 10.0:
             raise ConfigError(
-                "station.rotating.rate_rev_s", self.rate_rev_s, "a rate of 0.01 to 10 revolutions a second"
+                "world.station.rotating.rate_rev_s", self.rate_rev_s, "a rate of 0.01 to 10 revolutions a second"
             )
         if not 0.5 <= self.divergence_deg <= 120.0:
             raise ConfigError(
-                "station.rotating.divergence_deg", self.divergence_deg, "a full angle of 0.5 to 120 degrees"
+                "world.station.rotating.divergence_deg", self.divergence_deg, "a full angle of 0.5 to 120 degrees"
             )
         if not 380.0 <= self.wavelength_nm <= 720.0:
             raise ConfigError(
-                "station.rotating.wavelength_nm", self.wavelength_nm, "a visible wavelength, 380 to 720 nm"
+                "world.station.rotating.wavelength_nm", self.wavelength_nm, "a visible wavelength, 380 to 720 nm"
             )
-        if not self.power_w > 0.0:
-            raise ConfigError("station.rotating.power_w", self.power_w, "a power above 0 W")
+        check_finite("world.station.rotating.position_m", self.position_m, "three finite coordinates")
+        check_finite("world.station.rotating.initial_azimuth_deg", (self.initial_azimuth_deg,), "a finite angle")
+        check_above("world.station.rotating.power_w", self.power_w, 0.0, "a power above 0 W")
         if not 0.0 < self.efficiency <= 1.0:
-            raise ConfigError("station.rotating.efficiency", self.efficiency, "a fraction above 0 and up to 1")
+            raise ConfigError("world.station.rotating.efficiency", self.efficiency, "a fraction above 0 and up to 1")
         if not -90.0 < self.elevation_deg < 90.0:
-            raise ConfigError("station.rotating.elevation_deg", self.elevation_deg, "above -90 and below 90 degrees")
+            raise ConfigError(
+                "world.station.rotating.elevation_deg", self.elevation_deg, "above -90 and below 90 degrees"
+            )
 
     def azimuth_rad(self, station_time_s: float) -> float:
         """Azimuth of the beam's axis at a station time, in (-π, π]."""

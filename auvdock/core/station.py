@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from auvdock.assets import asset
 from auvdock.core.beacons import BeaconCfg, BeaconLayout, ring_layout
+from auvdock.core.checks import check_above, check_range
 from auvdock.core.errors import ConfigError
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.strict import load_toml
@@ -31,12 +33,10 @@ class FunnelCfg:
     def __post_init__(self) -> None:
         """Refuse what is not a funnel."""
         for name in ("mouth_radius_m", "length_m", "tube_radius_m", "tube_length_m"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"station.funnel.{name}", getattr(self, name), "a length above 0 m")
+            check_above(f"world.station.funnel.{name}", getattr(self, name), 0.0, "a length above 0 m")
         if self.tube_radius_m >= self.mouth_radius_m:
-            raise ConfigError("station.funnel.tube_radius_m", self.tube_radius_m, "less than mouth_radius_m")
-        if self.friction < 0.0:
-            raise ConfigError("station.funnel.friction", self.friction, "0 or more")
+            raise ConfigError("world.station.funnel.tube_radius_m", self.tube_radius_m, "less than mouth_radius_m")
+        check_range("world.station.funnel.friction", self.friction, 0.0, math.inf, "0 or more")
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,16 @@ class LatchCfg:
     max_speed_m_s: float = 1.0
     max_entry_speed_m_s: float = 1.0
     hold_s: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Refuse a latch that never closes or has held before it has closed."""
+        where = "world.station.latch"
+        check_range(f"{where}.depth_m", self.depth_m, 0.0, math.inf, "a depth of 0 m or more")
+        check_above(f"{where}.max_angle_deg", self.max_angle_deg, 0.0, "an angle above 0 and up to 90 degrees")
+        check_range(f"{where}.max_angle_deg", self.max_angle_deg, 0.0, 90.0, "an angle above 0 and up to 90 degrees")
+        for name in ("max_speed_m_s", "max_entry_speed_m_s"):
+            check_above(f"{where}.{name}", getattr(self, name), 0.0, "a speed above 0 m/s")
+        check_range(f"{where}.hold_s", self.hold_s, 0.0, math.inf, "a time of 0 s or more")
 
 
 @dataclass(frozen=True)
@@ -78,6 +88,25 @@ class ConicalStationCfg:
     """The station's other lights, or all of them when array_count is 0."""
     rotating: RotatingBeaconCfg | None = None
     """Paper B's rotating beacon, if the station carries one; no part of `layout`, whose lights stand still."""
+
+    def __post_init__(self) -> None:
+        """Refuse a station that reaches out of the water or into the ground, or whose latch lies beyond the tube."""
+        where, funnel = "world.station", self.funnel
+        remedy = f"at most the tube's length, {funnel.tube_length_m:g} m"
+        check_range(f"{where}.latch.depth_m", self.latch.depth_m, 0.0, funnel.tube_length_m, remedy)
+        lamps = [beacon.position_m[2] for beacon in self.beacons]
+        lamps += [self.rotating.position_m[2]] if self.rotating is not None else []
+        above_m, below_m = max([funnel.mouth_radius_m, *lamps]), max([funnel.mouth_radius_m, *(-z for z in lamps)])
+        remedy = f"more than {above_m:g} m, so high does the station reach above its mouth's centre"
+        check_above(f"{where}.depth_m", self.depth_m, above_m, remedy)
+        remedy = f"more than {below_m:g} m, so far does the station reach below its mouth's centre"
+        check_above(f"{where}.floor_below_m", self.floor_below_m, below_m, remedy)
+        check_range(f"{where}.array_count", self.array_count, 0, math.inf, "a number of 0 or more lights")
+        check_range(
+            f"{where}.array_beam_angle_deg", self.array_beam_angle_deg, 0.5, 360.0, "a full angle of 0.5 to 360 degrees"
+        )
+        check_range(f"{where}.array_tilt_deg", self.array_tilt_deg, -90.0, 90.0, "a tilt of -90 to 90 degrees")
+        check_above(f"{where}.array_power_w", self.array_power_w, 0.0, "a power above 0 W")
 
     @property
     def layout(self) -> BeaconLayout:

@@ -101,6 +101,8 @@ class HullPartCfg:
     """Centre from the origin."""
     size_m: tuple[float, float, float]
     """Full extent along x, y and z; round parts have their diameter twice."""
+    displaces: bool = True
+    """Whether the vehicle's buoyancy is spread over its volume; an open cage of rods displaces next to nothing."""
 
     def __post_init__(self) -> None:
         """Check shape and size."""
@@ -158,6 +160,25 @@ class VehicleCfg:
         middle_m, length_m = 0.5 * (self.nose_x_m + self.tail_x_m), self.nose_x_m - self.tail_x_m
         size_m = (length_m, 2.0 * self.radius_m, 2.0 * self.radius_m)
         return (HullPartCfg("hull", "capsule", (middle_m, 0.0, 0.0), size_m),)
+
+    @property
+    def displacing_parts(self) -> tuple[HullPartCfg, ...]:
+        """Those of them over which the buoyancy is spread.
+
+        Raises:
+            ConfigError: there are none.
+        """
+        parts = tuple(part for part in self.hull_parts if part.displaces)
+        if not parts:
+            raise ConfigError("hull", self.name, "a part that displaces water")
+        return parts
+
+    @cached_property
+    def hull_box_body_m(self) -> Array:
+        """(2, 3) least and greatest coordinates of the solid parts, package body axes."""
+        middles = np.array([flip_vector(np.array(part.position_m)) for part in self.hull_parts])
+        halves = 0.5 * np.array([part.size_m for part in self.hull_parts])
+        return np.stack([(middles - halves).min(axis=0), (middles + halves).max(axis=0)])
 
     @cached_property
     def seat_body_m(self) -> Array:

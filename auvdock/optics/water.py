@@ -87,10 +87,15 @@ def load_water(name: str) -> WaterCfg:
     return load_toml(WaterCfg, asset("waters", name))
 
 
-def with_attenuation(water: WaterCfg, c_450: float) -> WaterCfg:
+def with_attenuation(water: WaterCfg, c_450: float, field: str = "attenuation_per_m") -> WaterCfg:
     """The same water more or less turbid: b is scaled in all bands so that c(450 nm) = a + b is as given.
 
     Turbidity moves scattering and leaves absorption alone. A water without scattering gets b ∝ 1/λ.
+
+    Args:
+        water: the water.
+        c_450: c(450 nm) in 1/m.
+        field: what the user calls it, for the error.
 
     Raises:
         ConfigError: not finite, or below the water's absorption at 450 nm.
@@ -98,7 +103,7 @@ def with_attenuation(water: WaterCfg, c_450: float) -> WaterCfg:
     a_450, b_450 = water.absorption_per_m[0], water.scattering_per_m[0]
     if not math.isfinite(c_450) or c_450 < a_450:
         raise ConfigError(
-            "water.attenuation",
+            field,
             c_450,
             f"a finite attenuation of at least {a_450:g} 1/m, the absorption of {water.name!r} at 450 nm",
         )

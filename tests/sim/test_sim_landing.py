@@ -21,7 +21,7 @@ from auvdock.sim.simulator import SimCfg, Simulator
 
 STATION = load_landing_station()
 GUIDE, LATCH = STATION.guide, STATION.latch
-OPEN = dataclasses.replace(STATION, latch=dataclasses.replace(LATCH, max_speed_m_s=-1.0))
+OPEN = dataclasses.replace(STATION, latch=dataclasses.replace(LATCH, max_speed_m_s=1e-12))
 """The same station with an arm that never closes."""
 VEHICLES = ("remus_hybrid", "bluerov2_heavy")
 
