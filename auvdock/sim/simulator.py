@@ -19,6 +19,7 @@ from auvdock.sim.contacts import Contacts
 from auvdock.sim.dock import Weld
 from auvdock.sim.docks import make_dock
 from auvdock.sim.hydrodynamics import Hydrodynamics
+from auvdock.sim.immersion import Immersion
 from auvdock.sim.mj import MjData, addresses, mujoco
 from auvdock.sim.ocean import CurrentCfg, Ocean
 from auvdock.sim.scene import LATCH, VEHICLE, build_model
@@ -45,7 +46,7 @@ class SimCfg:
     def __post_init__(self) -> None:
         """Contacts need some 100 Hz; beyond 2000 Hz nothing is gained."""
         if not 100.0 <= self.physics_hz <= 2000.0:
-            raise ConfigError("sim.physics_hz", self.physics_hz, "a rate of 100 to 2000 Hz")
+            raise ConfigError("world.sim.physics_hz", self.physics_hz, "a rate of 100 to 2000 Hz")
 
 
 class HistoryEntry(NamedTuple):
@@ -63,8 +64,8 @@ class Simulator:
     """Steps the world; `truth` is for metrics, `proprioception` for the vehicle.
 
     Each step adds M_A to MuJoCo's mass matrix and the water's forces to its others (`stepping.advance`). A state that
-    is not finite or absurd (faster than 10 m/s or 50 rad/s, further than 200 m from the origin) freezes the simulator
-    at the last sane state: `truth.diverged` is True.
+    is not finite or absurd (faster than 10 m/s or 50 rad/s, further than 1 km from the start) freezes the simulator at
+    the last sane state: `truth.diverged` is True.
 
     Attributes:
         cfg: configuration.
@@ -102,7 +103,9 @@ class Simulator:
         self._body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
         hydrodynamics, watch = self._hydrodynamics, self._dock.watch
         water = hydrodynamics.displaced_kg, hydrodynamics.buoyancy_n, self._dt_s
-        self._constants = np.array([*water, watch.reach_m, *watch.normal_world, watch.offset_m])
+        self._immersion = Immersion(self.vehicle)
+        above = self._immersion.clearance_m
+        self._constants = np.array([*water, watch.reach_m, *watch.normal_world, watch.offset_m, above, 0.0, 0.0, 0.0])
         self._totals: Array = np.zeros(2)
         self._ring: Array = np.zeros((_HISTORY_STEPS + 1, ROW + len(self.vehicle.actuators)))
         self._truth: Truth | None = None
@@ -172,7 +175,7 @@ class Simulator:
         nu = np.zeros(6) if nu_relative_body is None else nu_relative_body
         check_shape("nu_relative_body", nu, (6,))
         qpos = np.concatenate([position_world_m, quat_wxyz / length]).astype(np.float64)
-        if is_absurd(qpos, nu.astype(np.float64)):
+        if is_absurd(qpos, nu.astype(np.float64), qpos[:3]):
             raise ValueError(f"cannot start at {position_world_m} with {nu}")
         water_rng, sensor_rng = rng.spawn(2)
         mujoco.mj_resetData(self.model, self._data)
@@ -181,12 +184,14 @@ class Simulator:
         self._actuators.reset()
         self._dock.reset()
         self._qpos[:] = qpos
+        self._constants[9:12] = qpos[:3]
         self._qvel[:3] = self._ocean.velocity(float(qpos[2])) + rotation_from_quat_wxyz(qpos[3:]) @ nu[:3]
         self._qvel[3:] = nu[3:]
         self._steps = 0
         self._diverged = False
         self._contacts.reset()
         self._totals[:] = 0.0
+        self._broached_s = 0.0
         self._absurd: list[HistoryEntry] = []
         keep(self._ring, 0, self._qpos, self._qvel)
         mujoco.mj_forward(self.model, self._data)
@@ -210,6 +215,7 @@ class Simulator:
         values = self._actuators.checked(command)
         while steps > 0 and not self._diverged:
             moving = np.empty(MOTION)
+            immersion = self._immersion.of(self._qpos, self._qvel)
             noise = self._ocean.noise(steps)
             made = advance(
                 *self._addresses,
@@ -230,6 +236,7 @@ class Simulator:
                 self._ocean.gust,
                 noise,
                 self._constants,
+                immersion,
                 self._totals,
                 self._ring,
                 moving,
@@ -242,6 +249,8 @@ class Simulator:
             self._ocean.used(made)
             self._poses_stale = True
             self._steps += made
+            if immersion is not self._immersion.under and immersion[0] < 1.0:
+                self._broached_s += made * self._dt_s
             steps -= made
             self._contacts.update()
             self._observe(moving)
@@ -280,6 +289,8 @@ class Simulator:
             entry_vertical_m=entry.vertical_m if entry else None,
             energy_j=float(self._totals[0]),
             path_length_m=float(self._totals[1]),
+            immersed_share=float(self._immersion.of(self._qpos, self._qvel)[0]),
+            broached_s=self._broached_s,
             diverged=self._diverged,
             landing=dock.landing,
         )
@@ -314,7 +325,7 @@ class Simulator:
         """Dock, latch and divergence after steps or a reset; `moving` is what `motion` says of the state."""
         qpos: list[float] = self._qpos.tolist()
         qvel: list[float] = self._qvel.tolist()
-        if is_absurd(self._qpos, self._qvel):
+        if is_absurd(self._qpos, self._qvel, self._constants[9:12]):
             self._freeze([])
             return
         if moving is not None:

@@ -2,7 +2,7 @@
 
 MuJoCo integrates M_RB, rigid-body Coriolis, weight and contacts. What is added here: added mass M_A into the mass
 matrix itself (so that contacts feel it), the forces −C_A(ν_r) ν_r − D(ν_r) ν_r, buoyancy, and actuators with their lag
-and power. Called from Python one by one these pieces would cost four times as much as the arithmetic in them.
+and power, each as far as it is in the water (`immersion`). Called from Python they would cost four times as much.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ MOTION = 34
 """Numbers that `motion` gives."""
 _MAX_SPEED_M_S = 10.0
 _MAX_RATE_RAD_S = 50.0
-_MAX_DISTANCE_M = 200.0
+_MAX_DISTANCE_M = 1000.0
 _mj_step1, _mj_factor_mass, _mj_step2 = c_function("mj_step1"), c_function("mj_factorM"), c_function("mj_step2")
 
 
@@ -61,6 +61,7 @@ def advance(
     gust: Array,
     noise: Array,
     constants: Array,
+    immersion: Array,
     totals: Array,
     history: Array,
     moving: Array,
@@ -68,8 +69,8 @@ def advance(
     """Make up to `steps` physics steps; fewer if something happens in one of them that has to be looked at.
 
     Each step: `mj_step1`, M_A into `mass`, `mj_factorM`, the water's forces into `applied`, `mj_step2`. It is the last
-    one if anything touches the vehicle, if the watched point has come to where the dock watches every step, or if the
-    state is absurd.
+    if anything touches the vehicle, if the watched point has come to where the dock watches every step, if the vehicle
+    is so high that it may leave the water, or if the state is absurd.
 
     Args:
         model: address of the `mjModel`.
@@ -90,8 +91,10 @@ def advance(
         current: (6,) `Ocean.current`.
         gust: (2,) present gust in m/s, advanced in place.
         noise: (m, 2) normal numbers that drive it, a row a step, m at least `steps`; (0, 2) where there are no gusts.
-        constants: (8,) displaced mass in kg, buoyancy in N, length of a step in s; the watched point's x in the body
-            frame and the half space (3 for its normal, 1 for its offset) in which the dock watches nothing.
+        constants: (12,) displaced mass in kg, buoyancy in N, length of a step in s; the watched point's x in the body
+            frame and the half space (3 for its normal, 1 for its offset) in which the dock watches nothing; the depth
+            of the origin in m from which all of the vehicle is under water; where the episode began (3).
+        immersion: (5 + n,) `immersion.immerse` of the present state.
         totals: (2,) hydraulic work in J and path length in m, summed up in place.
         history: (h, 14 + n) ring of the last steps: index of the step, state before it, command; and behind them the
             state after the last one that ended in a sane state.
@@ -106,7 +109,8 @@ def advance(
     dt_s = constants[2]
     water, acceleration = np.zeros(3), np.zeros(2)
     speeds = np.empty(len(weights) - 12)
-    if is_absurd(qpos, qvel):  # somebody wrote to the data
+    origin = constants[9:12]
+    if is_absurd(qpos, qvel, origin):  # somebody wrote to the data
         return 0
     made = 0
     while made < steps:
@@ -119,15 +123,17 @@ def advance(
         flow(qpos[2], current, gust, water)
         if len(noise) > 0:
             blow(current, noise[made], dt_s, gust, acceleration)
-        wrench(rotation, qvel, water, acceleration, state, actuators, weights, constants, applied, speeds)
-        add_mass(mass, rotation, added)
+        wrench(rotation, qvel, water, acceleration, state, actuators, weights, constants, immersion, applied, speeds)
+        add_mass(mass, rotation, added, immersion[0])
         _mj_factor_mass(model, data)
         path_m = math.sqrt(qvel[0] ** 2 + qvel[1] ** 2 + qvel[2] ** 2) * dt_s
         _mj_step2(model, data)
-        totals[0] += hydraulic_power_w(state, speeds, actuators) * dt_s
+        totals[0] += hydraulic_power_w(state, speeds, actuators, immersion[5:]) * dt_s
         totals[1] += path_m
         made += 1
-        if constraint[0] != 0.0 or constraint[1] != 0.0 or constraint[2] != 0.0 or is_absurd(qpos, qvel):
+        if constraint[0] != 0.0 or constraint[1] != 0.0 or constraint[2] != 0.0 or qpos[2] > -constants[8]:
+            break
+        if is_absurd(qpos, qvel, origin):
             break
         reach = constants[3]
         w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
@@ -137,7 +143,7 @@ def advance(
         if height <= constants[7]:
             break
     motion(qpos, qvel, current, gust, moving)
-    if not is_absurd(qpos, qvel):
+    if not is_absurd(qpos, qvel, origin):
         keep(history, done + made, qpos, qvel)
     return made
 
@@ -154,16 +160,17 @@ def keep(history: Array, index: int, qpos: Array, qvel: Array) -> None:
 
 
 @compiled
-def is_absurd(qpos: Array, qvel: Array) -> bool:
-    """True unless the state is finite, slower than 10 m/s and 50 rad/s, and within 200 m of the world's origin.
+def is_absurd(qpos: Array, qvel: Array, origin: Array) -> bool:
+    """True unless the state is finite, slower than 10 m/s and 50 rad/s, and within 1 km of where the episode began.
 
     Args:
         qpos: (7,) position and quaternion wxyz.
         qvel: (6,) linear and angular velocity.
+        origin: (3,) where the episode began.
     """
     length2, speed2, rate2 = 0.0, 0.0, 0.0
     for i in range(3):
-        length2 += qpos[i] * qpos[i]
+        length2 += (qpos[i] - origin[i]) ** 2
         speed2 += qvel[i] * qvel[i]
         rate2 += qvel[3 + i] * qvel[3 + i]
     norm2 = qpos[3] * qpos[3] + qpos[4] * qpos[4] + qpos[5] * qpos[5] + qpos[6] * qpos[6]
@@ -254,7 +261,7 @@ def respond(state: Array, command: Array, actuators: Array) -> None:
 
 
 @compiled
-def hydraulic_power_w(state: Array, speeds: Array, actuators: Array) -> float:
+def hydraulic_power_w(state: Array, speeds: Array, actuators: Array, shares: Array) -> float:
     """Hydraulic power of the thrusters at their advance speeds (k,) in m/s, each along its thrust axis.
 
     Actuator-disc theory (Rankine and Froude): P = ½ |T| (V + √(V² + 2 |T| / (ρ A))) with V the advance speed in the
@@ -264,12 +271,13 @@ def hydraulic_power_w(state: Array, speeds: Array, actuators: Array) -> float:
         state: (n,) states.
         speeds: (k,) advance speeds of the thrusters, in the order of the actuators.
         actuators: (4, n) `Actuators.table`.
+        shares: (n,) share of each actuator that is under water.
     """
     power, k = 0.0, 0
     for i in range(len(state)):
         if actuators[2, i] < 0.0:
             continue
-        thrust = abs(state[i]) * actuators[2, i]
+        thrust = abs(state[i]) * actuators[2, i] * shares[i]
         speed = speeds[k] if state[i] > 0.0 else -speeds[k]
         power += 0.5 * thrust * (speed + math.sqrt(speed * speed + actuators[3, i] * thrust))
         k += 1
@@ -277,8 +285,8 @@ def hydraulic_power_w(state: Array, speeds: Array, actuators: Array) -> float:
 
 
 @compiled
-def add_mass(rows: Array, rotation: Array, added: Array) -> None:
-    """Add T M_A Tᵀ with T = diag(R, 1), M_A in a free joint's coordinates, to its mass matrix.
+def add_mass(rows: Array, rotation: Array, added: Array, share: float) -> None:
+    """Add s T M_A Tᵀ with T = diag(R, 1), M_A in a free joint's coordinates, to its mass matrix.
 
     A free joint's velocity is (linear in the world frame, angular in the body frame).
 
@@ -286,6 +294,7 @@ def add_mass(rows: Array, rotation: Array, added: Array) -> None:
         rows: (21,) lower triangle of the mass matrix, row by row.
         rotation: (3, 3) R, body to world.
         added: (6, 6) M_A.
+        share: s, of the hull's volume that is under water.
     """
     half, whole = np.empty((6, 6)), np.empty((6, 6))
     for i in range(3):
@@ -303,7 +312,7 @@ def add_mass(rows: Array, rotation: Array, added: Array) -> None:
     place = 0
     for i in range(6):
         for j in range(i + 1):
-            rows[place] += whole[i, j]
+            rows[place] += share * whole[i, j]
             place += 1
 
 
@@ -317,10 +326,15 @@ def wrench(
     actuators: Array,
     weights: Array,
     constants: Array,
+    immersion: Array,
     force: Array,
     speeds: Array,
 ) -> None:
     """The water's generalised force on the free joint, by `Hydrodynamics`' one matrix product.
+
+    Where a share s of the hull is under water, all of it is taken s times, but each actuator by its own share; buoyancy
+    acts in the middle of what is immersed. Added mass that grows is met at rest and asks for its momentum, −ṡ M_A ν_r
+    (von Kármán 1929); what falls off keeps its own and asks for none: both lose kinetic energy, ½ |ṡ| ν_rᵀ M_A ν_r.
 
     Args:
         rotation: (3, 3) R, body to world.
@@ -331,6 +345,7 @@ def wrench(
         actuators: (4, n) `Actuators.table`; says which of them are fins.
         weights: (12 + k, 21 + n) `Hydrodynamics.weights`.
         constants: displaced mass in kg and buoyancy in N first.
+        immersion: (5 + n,) `immersion.immerse`.
         force: (6,) takes the force in the world frame in N and the moment about the origin in the body frame in N m.
         speeds: (k,) takes the thrusters' advance speeds in m/s.
     """
@@ -350,23 +365,36 @@ def wrench(
     z[19] += r * u - p * w
     z[20] += p * v - q * u
     for i in range(len(state)):
-        z[21 + i] = state[i]
+        z[21 + i] = state[i] * immersion[5 + i]
         if actuators[2, i] < 0.0:
             z[21 + i] *= u * s  # a fin's force grows with the square of the speed
     out = np.zeros(len(weights))
     for i in range(len(out)):
-        for j in range(len(z)):
+        for j in range(21):
+            out[i] += weights[i, j] * z[j]
+        if i < 12:
+            out[i] *= immersion[0]
+        for j in range(21, len(z)):
             out[i] += weights[i, j] * z[j]
     px, py, pz, hx, hy, hz = out[6], out[7], out[8], out[9], out[10], out[11]
-    # −C_A(ν_r) ν_r = (p × ω, p × v + h × ω) with the added momenta p, h (Fossen 2011, equation 6.43).
+    # −C_A(ν_r) ν_r = (p × ω, p × v + h × ω) with the added momenta p, h, s times M_A ν_r (Fossen 2011, equation 6.43).
     fx, fy, fz = out[0] + py * r - pz * q, out[1] + pz * p - px * r, out[2] + px * q - py * p
+    mx = out[3] + py * w - pz * v + hy * r - hz * q
+    my = out[4] + pz * u - px * w + hz * p - hx * r
+    mz = out[5] + px * v - py * u + hx * q - hy * p
+    if immersion[0] < 1.0:
+        lift = constants[1]
+        mx += lift * (immersion[3] * rotation[2, 2] - immersion[4] * rotation[2, 1])
+        my += lift * (immersion[4] * rotation[2, 0] - immersion[2] * rotation[2, 2])
+        mz += lift * (immersion[2] * rotation[2, 1] - immersion[3] * rotation[2, 0])
+        grown = immersion[1] / max(immersion[0], 1e-9)
+        fx, fy, fz = fx - grown * px, fy - grown * py, fz - grown * pz
+        mx, my, mz = mx - grown * hx, my - grown * hy, mz - grown * hz
     for i in range(3):
         force[i] = rotation[i, 0] * fx + rotation[i, 1] * fy + rotation[i, 2] * fz
-    force[0] += constants[0] * gust[0]
-    force[1] += constants[0] * gust[1]
-    force[2] += constants[1]
-    force[3] = out[3] + py * w - pz * v + hy * r - hz * q
-    force[4] = out[4] + pz * u - px * w + hz * p - hx * r
-    force[5] = out[5] + px * v - py * u + hx * q - hy * p
+    force[0] += immersion[0] * constants[0] * gust[0]
+    force[1] += immersion[0] * constants[0] * gust[1]
+    force[2] += immersion[0] * constants[1]
+    force[3], force[4], force[5] = mx, my, mz
     for k in range(len(speeds)):
         speeds[k] = out[12 + k]

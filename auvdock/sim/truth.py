@@ -60,6 +60,8 @@ class Truth(NamedTuple):
         entry_vertical_m: upward offset at that moment; None before.
         energy_j: hydraulic work of the thrusters so far (`Actuators.power_w`).
         path_length_m: distance over ground so far.
+        immersed_share: share of the hull's displaced volume that is under water.
+        broached_s: time so far in which some of it was not.
         diverged: True once the state was not finite or absurd; the state then stays frozen.
         landing: how the vehicle stands to a landing station; None at a conical one.
     """
@@ -82,6 +84,8 @@ class Truth(NamedTuple):
     entry_vertical_m: float | None
     energy_j: float
     path_length_m: float
+    immersed_share: float
+    broached_s: float
     diverged: bool
     landing: LandingTruth | None = None
 

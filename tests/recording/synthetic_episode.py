@@ -80,6 +80,8 @@ def ticks(
             entry_vertical_m=None,
             energy_j=0.0,
             path_length_m=20.0 * share,
+            immersed_share=1.0,
+            broached_s=0.0,
             diverged=False,
         )
         yield Tick(

@@ -43,9 +43,12 @@ def undamped(vehicle: VehicleCfg, added_mass: dict[str, float] | None = None) ->
 
 
 def simulator(
-    vehicle: VehicleCfg = REMUS, station: ConicalStationCfg = DEEP_STATION, current: CurrentCfg | None = None
+    vehicle: VehicleCfg = REMUS,
+    station: ConicalStationCfg = DEEP_STATION,
+    current: CurrentCfg | None = None,
+    rate_hz: float = 120.0,
 ) -> Simulator:
-    return Simulator(SimCfg(current=current or CurrentCfg()), station, vehicle)
+    return Simulator(SimCfg(current=current or CurrentCfg(), physics_hz=rate_hz), station, vehicle)
 
 
 def start(

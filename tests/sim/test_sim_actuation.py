@@ -24,7 +24,7 @@ def step(actuators: Actuators, command: Sequence[float] | Array) -> Array:
 
 
 def power_w(actuators: Actuators, speeds: Array) -> float:
-    return hydraulic_power_w(actuators.state, speeds, actuators.table)
+    return hydraulic_power_w(actuators.state, speeds, actuators.table, np.ones(7))
 
 
 def test_step_response_is_the_exponential() -> None:

@@ -98,14 +98,19 @@ def test_a_blow_up_within_a_step_is_caught_in_that_step() -> None:
     assert abs(sim.history[-1].qvel[0]) > 10.0
 
 
-def test_leaving_the_area_is_divergence() -> None:
-    sim = simulator()
-    start(sim, (186.0, 0.0, -60.0), nu_relative=np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
-    run(sim, 1.0, command(sim, stern=1.0))
+@pytest.mark.parametrize("place", [(186.0, 0.0, -60.0), (40.0, 0.0, -6000.0), (-9000.0, 9000.0, -3.0)])
+def test_only_the_way_from_the_start_is_absurd_never_a_place(place: tuple[float, float, float]) -> None:
+    sim = simulator(station=dataclasses.replace(STATION, depth_m=6000.0, floor_below_m=60.0))
+    start(sim, place, nu_relative=np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    run(sim, 6.0, command(sim, stern=1.0))
     assert not sim.truth.diverged
-    run(sim, 5.0, command(sim, stern=1.0))
+    sim.data.qpos[1] += 990.0
+    run(sim, 1.0, command(sim))
+    assert not sim.truth.diverged
+    sim.data.qpos[1] += 20.0
+    run(sim, 1.0, command(sim))
     assert sim.truth.diverged
-    assert np.linalg.norm(sim.truth.T_world_body[:3, 3]) < 200.0
+    assert np.linalg.norm(sim.truth.T_world_body[:3, 3] - place) < 1000.0
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from auvdock.core.transforms import rotation_from_quat_wxyz
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.sim.actuation import Actuators
 from auvdock.sim.hydrodynamics import Hydrodynamics
+from auvdock.sim.immersion import Immersion
 from auvdock.sim.stepping import add_mass, wrench
 
 
@@ -22,7 +23,8 @@ def water_wrench(
     constants = np.array([hydrodynamics.displaced_kg, hydrodynamics.buoyancy_n])
     force, speeds = np.empty(6), np.empty(len(actuators.thrusters))
     weights, table = hydrodynamics.weights, actuators.table
-    wrench(rotation, velocity, water, gust, state, table, weights, constants, force, speeds)
+    under = Immersion(vehicle).under
+    wrench(rotation, velocity, water, gust, state, table, weights, constants, under, force, speeds)
     return force, speeds
 
 
@@ -131,7 +133,7 @@ def test_added_mass_rows_turn_with_the_body() -> None:
         rotation, nu = random_rotation(rng), random_nu(rng)
         lower = np.zeros((6, 6))
         rows = np.zeros(21)
-        add_mass(rows, rotation, added)
+        add_mass(rows, rotation, added, 1.0)
         lower[np.tril_indices(6)] = rows
         mass = lower + lower.T - np.diag(np.diag(lower))
         joint = np.concatenate([rotation @ nu[:3], nu[3:]])
