@@ -23,7 +23,7 @@ The limits in newtons and radians stand in `assets/vehicles/remus_hybrid.toml`.
 ## Observation space
 Chosen by `observation`:
 
-All boxes are float64 and bounded by ±1000, which nothing reaches before the episode ends as `diverged`.
+All boxes are float64 and bounded by ±1000, which nothing reaches before the episode ends as `carried_off`.
 
 `"state"` (default): `Box` of shape (19,), the true state. Privileged: no real vehicle has it.
 
@@ -50,15 +50,16 @@ All boxes are float64 and bounded by ±1000, which nothing reaches before the ep
 
 ## Reward
 Progress of the nose towards the latch in metres, less 0.001 times the thruster work in joules, plus 100 on success,
-less 50 on collision or divergence.
+less 50 on collision, divergence, surfacing or being carried off.
 
 ## Starting state
 Uniform within `WorldCfg.start`: 15 to 30 m in front of the mouth, ±3 m sideways, ±1.5 m in depth, ±30° of heading.
 
 ## Episode end
-Terminated by success, a collision harder than `WorldCfg.limits.collision_force_n`, divergence, or a latch that closed
-on an entry outside its limits (`terminal`). Truncated after `WorldCfg.limits.max_time_s`. `info` always has
-`is_success` (bool) and `failure_reason` (str or None).
+Terminated by success, a collision harder than `WorldCfg.limits.collision_force_n`, divergence, a latch that closed on
+an entry outside its limits (`terminal`), a hull that has been partly out of the water for `limits.surfaced_s` in all
+(`surfaced`), or a vehicle `limits.carried_off_m` further from the station than at the start (`carried_off`). Truncated
+after `WorldCfg.limits.max_time_s`. `info` always has `is_success` (bool) and `failure_reason` (str or None).
 
 ## Arguments
 `cfg` (`WorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`

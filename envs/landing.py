@@ -26,7 +26,7 @@ For `remus_hybrid` they are those of `auvdock/ConicalDocking-v0`, n = 7. Limits,
 ## Observation space
 Chosen by `observation`. "Seat" is the middle of the round that comes to rest in the guides, of the hull or of a keel.
 
-All boxes are float64 and bounded by ±1000, which nothing reaches before the episode ends as `diverged`.
+All boxes are float64 and bounded by ±1000, which nothing reaches before the episode ends as `carried_off`.
 
 `"state"` (default): `Box` of shape (19,), the true state. Privileged: no real vehicle has it.
 
@@ -53,16 +53,18 @@ All boxes are float64 and bounded by ±1000, which nothing reaches before the ep
 
 ## Reward
 Progress of the seat towards its place in metres, less 0.001 times the thruster work in joules, plus 100 on success,
-less 50 on collision or divergence.
+less 50 on collision, divergence, surfacing or being carried off.
 
 ## Starting state
 Uniform within `LandingWorldCfg.start`: 3 to 6 m above the seat's place, ±1.5 m along and across, ±45° of heading, at
 rest in the water.
 
 ## Episode end
-Terminated by success, a collision harder than `LandingWorldCfg.limits.collision_force_n`, divergence, or an arm that
-closed after a touchdown that was too hard (`terminal`). Truncated after `LandingWorldCfg.limits.max_time_s`. `info`
-always has `is_success` (bool) and `failure_reason` (str or None).
+Terminated by success, a collision harder than `LandingWorldCfg.limits.collision_force_n`, divergence, an arm that
+closed after a touchdown that was too hard (`terminal`), a hull that has been partly out of the water for
+`limits.surfaced_s` in all (`surfaced`), or a vehicle `limits.carried_off_m` further from the station than at the start
+(`carried_off`). Truncated after `LandingWorldCfg.limits.max_time_s`. `info` always has `is_success` (bool) and
+`failure_reason` (str or None).
 
 ## Arguments
 `cfg` (`LandingWorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`

@@ -50,7 +50,8 @@ tell the time: the newest frame's is that of the observation. Needs `fidelity="p
 
 ## Reward
 Progress of the nose towards the latch in metres (straight, though the way leads around the station), less 0.001 times
-the thruster work in joules, plus 100 on success, less 50 on collision or divergence.
+the thruster work in joules, plus 100 on success, less 50 on collision, divergence, surfacing or being
+carried off.
 
 ## Starting state
 Uniform within `WorldCfg.start`: radius 20 to 45 m, azimuth ±180°, ±1.5 m in depth, any heading. With

@@ -144,7 +144,7 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
         self._distance_m, self._energy_j = distance_m, truth.energy_j
         if success:
             reward += 100.0
-        elif end in ("diverged", "collision"):
+        elif end in ("diverged", "collision", "surfaced", "carried_off"):
             reward -= 50.0
         return float(reward)
 

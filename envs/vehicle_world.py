@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -120,13 +121,15 @@ class VehicleWorld(ABC):
         self.camera = make_camera(self.simulator.vehicle)
         self.water = load_water(cfg.water)
         if cfg.attenuation_per_m is not None:
-            self.water = with_attenuation(self.water, cfg.attenuation_per_m)
+            self.water = with_attenuation(self.water, cfg.attenuation_per_m, "world.attenuation_per_m")
         self._limits, self._hold_s, self._control_s = cfg.limits, station.latch.hold_s, 1.0 / cfg.control_hz
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)
         self._steps_per_frame = round(cfg.sim.physics_hz / self.camera.rate_hz)
         self._step_count = 0
         self._last_frame_step = -1
         self._latched_at_s: float | None = None
+        self._station_m: list[float] = self.simulator.T_world_station[:3, 3].tolist()
+        self._start_distance_m = 0.0
         self._truth: Truth | None = None
 
     @abstractmethod
@@ -170,6 +173,7 @@ class VehicleWorld(ABC):
         self._last_frame_step = -self._steps_per_frame
         self._latched_at_s = None
         self._truth = None
+        self._start_distance_m = self._distance_m()
 
     def step(self, values: Array) -> None:
         """Apply actuator commands (n,) in [-1, 1] for one control period."""
@@ -206,9 +210,17 @@ class VehicleWorld(ABC):
             held_s = truth.time_s - self._latched_at_s
             if held_s > self._hold_s + self._control_s:
                 return "terminal"  # held, but entered too fast or too far askew: that will not change any more
+        if truth.broached_s >= self._limits.surfaced_s:
+            return "surfaced"
+        if self._distance_m() - self._start_distance_m > self._limits.carried_off_m:
+            return "carried_off"
         if truth.time_s >= self._limits.max_time_s - 1e-9:
             return "timeout"
         return None
+
+    def _distance_m(self) -> float:
+        """Of the vehicle from the station."""
+        return math.dist(self.truth.T_world_body[:3, 3].tolist(), self._station_m)
 
     @property
     def is_success(self) -> bool:

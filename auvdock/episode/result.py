@@ -8,7 +8,7 @@ from typing import Any
 
 from auvdock.core.strict import to_plain
 
-__all__ = ["FAILURE_REASONS", "EpisodeResult", "stage_of"]
+__all__ = ["FAILURE_REASONS", "LOST_REASONS", "EpisodeResult", "stage_of"]
 
 FAILURE_REASONS = (
     "search",
@@ -20,6 +20,8 @@ FAILURE_REASONS = (
     "near",
     "terminal",
     "collision",
+    "surfaced",
+    "carried_off",
     "timeout",
     "diverged",
     "interrupted",
@@ -29,10 +31,17 @@ FAILURE_REASONS = (
 """Why an episode failed: the guidance stage in which the pilot gave up or time ran out, or what ended it.
 
 `search` to `terminal`: the pilot gave up, or time ran out, in that stage. `collision`: a contact harder than the
-vehicle's structure bears. `timeout`: time ran out while backing off for another attempt. `diverged`: the simulation's
-state became absurd. `interrupted`: the user stopped it. In campaigns only, `hung`: it took longer than its wall-clock
-limit; `crashed`: it raised an exception or took its worker down.
+vehicle's structure bears. `surfaced`: some of the hull was out of the water for some seconds in all
+(`LimitsCfg.surfaced_s`). `carried_off`: it got much further from the station than it had started
+(`LimitsCfg.carried_off_m`). `timeout`: time ran out while backing off for another attempt. `diverged`: the simulation's
+state became absurd. `interrupted`: the user stopped it. In campaigns only, and without a result, so that they count in
+no rate (`LOST_REASONS`), `hung`: it took longer than its wall-clock limit; `crashed`: it raised an exception or took
+its worker down.
 """
+
+
+LOST_REASONS = ("hung", "crashed")
+"""Those that say nothing of the method: the episode left no result."""
 
 
 def stage_of(mode: str, names: Mapping[str, str]) -> str:

@@ -31,6 +31,8 @@ CAUSES = {
     "near": "#f2b872",
     "terminal": "#dd7a3c",
     "collision": "#b3262e",
+    "surfaced": "#c2a83e",
+    "carried_off": "#7a5c3e",
     "timeout": "#7d7d7d",
     "diverged": "#8e5ea2",
     "interrupted": "#c4c4c4",
@@ -65,7 +67,7 @@ _styled = rc_context(
 
 @_styled
 def map_figure(found: Map) -> str:
-    """Heat map of success rates, each cell with its rate, interval and number of episodes."""
+    """Heat map of success rates, each cell with its rate, interval, number of episodes and, if any, of lost ones."""
     shares = np.array([[np.nan if cell.rate is None else cell.rate for cell in line] for line in found.rates])
     rows, columns = shares.shape
     figure = Figure(figsize=(1.6 + 1.25 * columns, 1.3 + 0.62 * rows), layout="constrained")
@@ -77,7 +79,8 @@ def map_figure(found: Map) -> str:
             text = "–" if cell.rate is None else f"{100 * cell.rate:.0f} %"
             ink = "white" if dark else INK
             axes.text(column, row + 0.08, text, ha="center", va="bottom", fontsize=11, fontweight="bold", color=ink)
-            below = f"[{100 * cell.low:.0f}, {100 * cell.high:.0f}]  n={cell.episodes}"
+            lost = f", {cell.lost} lost" if cell.lost else ""
+            below = f"[{100 * cell.low:.0f}, {100 * cell.high:.0f}]  n={cell.episodes}{lost}"
             axes.text(column, row - 0.05, below, ha="center", va="top", fontsize=7.5, color=ink)
     axes.set_xticks(range(columns), found.across.ticks)
     axes.set_xlabel(found.across.label)
@@ -146,7 +149,7 @@ def cause_figure(campaign: Campaign) -> str:
         axes.text(left + 0.4, place, f"n={len(group)}", va="center", fontsize=7.5, color=MUTED)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylabel(label)
-    axes.set_xlabel("failed episodes, % of the row's")
+    axes.set_xlabel("failed and lost episodes, % of the row's")
     handles = [axes.barh(0, 0, color=CAUSES[cause], label=cause) for cause in causes]
     if handles:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=9)
