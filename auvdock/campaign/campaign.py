@@ -13,9 +13,10 @@ from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.executor import Executor, peak_rss_mb
 from auvdock.campaign.job import Job
 from auvdock.campaign.plan import Plan
-from auvdock.campaign.row import Row
+from auvdock.campaign.row import Row, Value, outcome
 from auvdock.campaign.statistics import Rate, wilson
 from auvdock.campaign.store import Store, read_table
+from auvdock.episode.result import LOST_REASONS
 
 __all__ = ["CampaignObserver", "CampaignSummary", "Tally", "run_campaign"]
 
@@ -34,17 +35,20 @@ class Tally:
     episodes: int = 0
     successes: int = 0
     crashes: int = 0
+    lost: int = 0
+    """Crashed or hung."""
 
-    def add(self, success: bool, crashed: bool) -> None:
-        """Count one episode."""
+    def add(self, success: bool, reason: Value) -> None:
+        """Count one episode by its success and failure reason."""
         self.episodes += 1
         self.successes += success
-        self.crashes += crashed
+        self.crashes += reason == "crashed"
+        self.lost += reason in LOST_REASONS
 
     @property
     def rate(self) -> Rate:
-        """Success rate with its Wilson 95 % interval."""
-        return wilson(self.successes, self.episodes)
+        """Success rate of those that left a result, with its Wilson 95 % interval."""
+        return wilson(self.successes, self.episodes - self.lost, lost=self.lost)
 
 
 class CampaignObserver(Protocol):
@@ -68,8 +72,9 @@ class CampaignSummary:
     """A campaign's outcome.
 
     Attributes:
-        rate: over all its finished episodes.
-        failures: failed episodes by cause.
+        rate: over all its episodes that left a result.
+        failures: those of them that failed, by cause.
+        lost: episodes without a result, by cause (`LOST_REASONS`).
         ran: episodes run by this call, the others were there.
         wall_s: wall-clock time of this call.
         peak_rss_mb: this process's peak memory plus each worker's own peak.
@@ -77,6 +82,7 @@ class CampaignSummary:
 
     rate: Rate
     failures: dict[str, int]
+    lost: dict[str, int]
     ran: int
     wall_s: float
     peak_rss_mb: float
@@ -99,10 +105,10 @@ def run_campaign(
     started = time.perf_counter()
     plan = Plan(cfg)
     tally = Tally()
-    outcomes: dict[int, bool] = {}
+    outcomes: dict[int, bool | None] = {}
     for row in read_table(store.folder).select(["episode", "success", "failure_reason"]).to_pylist():
-        outcomes[row["episode"]] = row["success"]
-        tally.add(row["success"], row["failure_reason"] == "crashed")
+        outcomes[row["episode"]] = outcome(row)
+        tally.add(row["success"], row["failure_reason"])
     ran = 0
     observer.on_start(len(plan), tally)
     try:
@@ -114,8 +120,8 @@ def run_campaign(
                 executor.start(job)
             for row in executor.run(plan[episode] for episode in pending):
                 store.add(row)
-                outcomes[int(row["episode"] or 0)] = bool(row["success"])
-                tally.add(bool(row["success"]), row["failure_reason"] == "crashed")
+                outcomes[int(row["episode"] or 0)] = outcome(row)
+                tally.add(bool(row["success"]), row["failure_reason"])
                 ran += 1
                 observer.on_row(row, tally)
                 if tally.crashes == tally.episodes == CRASHES:
@@ -130,14 +136,15 @@ def run_campaign(
     reasons = Counter(read_table(store.folder).column("failure_reason").drop_null().to_pylist())
     return CampaignSummary(
         rate=tally.rate,
-        failures=dict(reasons.most_common()),
+        failures={name: count for name, count in reasons.most_common() if name not in LOST_REASONS},
+        lost={name: count for name, count in reasons.most_common() if name in LOST_REASONS},
         ran=ran,
         wall_s=time.perf_counter() - started,
         peak_rss_mb=peak_rss_mb() + executor.peak_rss_mb,
     )
 
 
-def _rounds(plan: Plan, outcomes: dict[int, bool]) -> Iterator[Sequence[int]]:
+def _rounds(plan: Plan, outcomes: dict[int, bool | None]) -> Iterator[Sequence[int]]:
     """Episodes by rounds, each to be finished before the next is asked for."""
     if not plan.cfg.until_ci:
         yield range(len(plan))
@@ -146,29 +153,32 @@ def _rounds(plan: Plan, outcomes: dict[int, bool]) -> Iterator[Sequence[int]]:
         yield from _rounds_by_cell(plan, outcomes)
         return
     step = max(ROUND_EPISODES, plan.cells)
-    successes = 0
     for start in range(0, len(plan), step):
         end = min(start + step, len(plan))
         yield range(start, end)
-        successes += sum(outcomes[episode] for episode in range(start, end))
-        if wilson(successes, end).half_width <= plan.cfg.until_ci:
+        if _half_width([outcomes[episode] for episode in range(end)]) <= plan.cfg.until_ci:
             return
 
 
-def _rounds_by_cell(plan: Plan, outcomes: dict[int, bool]) -> Iterator[Sequence[int]]:
+def _rounds_by_cell(plan: Plan, outcomes: dict[int, bool | None]) -> Iterator[Sequence[int]]:
     """Rounds in which every cell of the grid runs its next episodes until its own interval is narrow enough.
 
     Episode i lies in cell i mod (number of cells); a cell has its share of the plan's episodes, never other cells'.
     """
-    successes = dict.fromkeys(range(plan.cells), 0)
+    cells: dict[int, list[bool | None]] = {cell: [] for cell in range(plan.cells)}
     for first in range(0, -(-len(plan) // plan.cells), CELL_EPISODES):
         last = first + CELL_EPISODES
-        visited = [visit * plan.cells + cell for visit in range(first, last) for cell in successes]
+        visited = [visit * plan.cells + cell for visit in range(first, last) for cell in cells]
         episodes = [episode for episode in visited if episode < len(plan)]
         yield episodes
         for episode in episodes:
-            successes[episode % plan.cells] += outcomes[episode]
-        wide = {cell for cell, count in successes.items() if wilson(count, last).half_width > plan.cfg.until_ci}
-        successes = {cell: count for cell, count in successes.items() if cell in wide}
-        if not successes:
+            cells[episode % plan.cells].append(outcomes[episode])
+        cells = {cell: found for cell, found in cells.items() if _half_width(found) > plan.cfg.until_ci}
+        if not cells:
             return
+
+
+def _half_width(outcomes: Sequence[bool | None]) -> float:
+    """Of the interval of those that are not None."""
+    flown = [outcome for outcome in outcomes if outcome is not None]
+    return wilson(sum(flown), len(flown)).half_width

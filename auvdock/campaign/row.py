@@ -8,9 +8,9 @@ from typing import Any, get_args, get_type_hints
 
 from auvdock.campaign.config import CampaignCfg
 from auvdock.campaign.plan import EpisodeSpec
-from auvdock.episode.result import EpisodeResult
+from auvdock.episode.result import LOST_REASONS, EpisodeResult
 
-__all__ = ["RESULT_COLUMNS", "Row", "Value", "columns", "differences", "lost_row", "row_of"]
+__all__ = ["RESULT_COLUMNS", "Row", "Value", "columns", "differences", "lost_row", "outcome", "row_of"]
 
 Value = bool | int | float | str | None
 Row = dict[str, Value]
@@ -50,6 +50,11 @@ def lost_row(spec: EpisodeSpec, reason: str, error: str) -> Row:
     nothing: Row = dict.fromkeys(RESULT_COLUMNS)
     outcome: Row = {"success": False, "failure_reason": reason}
     return {"episode": spec.episode, "seed": spec.seed, **spec.point, **nothing, **outcome, "error": error}
+
+
+def outcome(row: Mapping[str, Any]) -> bool | None:
+    """Whether an episode was a success; None if it left no result, which is neither success nor failure."""
+    return None if row["failure_reason"] in LOST_REASONS else row["success"] is True
 
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:

@@ -19,15 +19,17 @@ class Rate:
 
     Attributes:
         successes: k.
-        episodes: n.
+        episodes: n, all of which were flown to an end.
         low: lower bound.
         high: upper bound.
+        lost: episodes beside these that left no result (`LOST_REASONS`); neither success nor failure.
     """
 
     successes: int
     episodes: int
     low: float
     high: float
+    lost: int = 0
 
     @property
     def rate(self) -> float | None:
@@ -40,25 +42,31 @@ class Rate:
         return (self.high - self.low) / 2.0
 
 
-def wilson(successes: int, episodes: int, z: float = Z_95) -> Rate:
+def wilson(successes: int, episodes: int, z: float = Z_95, lost: int = 0) -> Rate:
     """Wilson's score interval for a proportion (Wilson 1927; Brown, Cai and DasGupta 2001, equation 4).
 
     (k + z²/2)/(n + z²) ± z √n/(n + z²) √(p̂ (1 − p̂) + z²/(4 n)); without episodes it is [0, 1].
 
+    Args:
+        successes: k.
+        episodes: n, of those that left a result.
+        z: quantile of the standard normal distribution.
+        lost: how many left none; told beside the rate, they do not enter it.
+
     Raises:
         ValueError: counts that cannot be.
     """
-    if not 0 <= successes <= episodes:
+    if not 0 <= successes <= episodes or lost < 0:
         raise ValueError(f"{successes} successes of {episodes} episodes")
     if episodes == 0:
-        return Rate(0, 0, 0.0, 1.0)
+        return Rate(0, 0, 0.0, 1.0, lost)
     share = successes / episodes
     centre = (successes + z * z / 2.0) / (episodes + z * z)
     half = z * math.sqrt(episodes) / (episodes + z * z) * math.sqrt(share * (1.0 - share) + z * z / (4.0 * episodes))
     # At 0 and n the bound is 0 and 1 exactly; rounding must not move it.
     low = 0.0 if successes == 0 else max(0.0, centre - half)
     high = 1.0 if successes == episodes else min(1.0, centre + half)
-    return Rate(successes, episodes, low, high)
+    return Rate(successes, episodes, low, high, lost)
 
 
 @dataclass(frozen=True)

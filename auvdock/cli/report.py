@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from auvdock.campaign.report.page import html_page, recording_path
 from auvdock.campaign.report.tables import csv_table, latex_table
 from auvdock.cli.parsing import parse
 from auvdock.core.errors import ConfigError
+from auvdock.episode.result import LOST_REASONS
 from auvdock.episode.runner import EpisodeRunner
 
 __all__ = ["Report", "run"]
@@ -65,6 +67,8 @@ def run(argv: Sequence[str], prog: str) -> int:
         console = Console()
         shares = f"{100 * (rate.rate or 0.0):.1f} % [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
         console.print(f"success {shares} in {rate.episodes} episodes", highlight=False)
+        if rate.lost:
+            console.print(f"[red]{rate.lost} MORE WITHOUT RESULT: crashed or hung, in no rate[/red]", highlight=False)
         if comparison:
             test = comparison.test
             console.print(f"against {args.against}: {100 * test.difference:+.1f} points, p = {test.p_value:.3g}")
@@ -88,18 +92,20 @@ def _record(campaign: Campaign, count: int) -> None:
 
 
 def _plain(campaign: Campaign, comparison: Comparison | None, page: Path) -> dict[str, object]:
-    rate = campaign.rate
+    rate, causes = campaign.rate, Counter(row["failure_reason"] for row in campaign.rows)
     figures: dict[str, object] = {
         "report": str(page),
         "success_rate": rate.rate,
         "ci_low": rate.low,
         "ci_high": rate.high,
         "episodes": rate.episodes,
+        "lost": {name: count for name, count in causes.items() if name in LOST_REASONS},
     }
     if comparison:
         test = comparison.test
         figures["comparison"] = {
             "pairs": test.pairs,
+            "lost_pairs": comparison.lost,
             "only_first": test.only_first,
             "only_second": test.only_second,
             "difference": test.difference,

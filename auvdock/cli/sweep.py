@@ -31,7 +31,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.strict import read_toml, to_plain
 from auvdock.episode.config import AnyEpisodeCfg, EpisodeCfg, LandingEpisodeCfg
 
-__all__ = ["Sweep", "run"]
+__all__ = ["Sweep", "plain_summary", "print_summary", "run"]
 
 AXIS_FLAGS = (
     "attenuation",
@@ -54,7 +54,10 @@ class SweepFlags:
     A range is low:high:count for a grid, low:high to draw from a distribution, or values with commas between them. Grid
     axes are crossed with each other.
 
-    Exit code: 0 all episodes have run, 2 input that cannot be used or a store that cannot be written.
+    Episodes that crashed or hung left no result: they are told apart and count in no rate.
+
+    Exit code: 0 all episodes have run, however they ended, 2 input that cannot be used or a store that cannot be
+    written.
     """
 
     out: Path
@@ -170,9 +173,9 @@ def run(argv: Sequence[str], prog: str) -> int:
     with redirect_stdout(sys.stderr):  # Ray tells of lost nodes on standard output, which belongs to the summary
         summary = run_campaign(cfg, DockingJob(cfg), store, executor, observer)
     if args.json:
-        print(json.dumps(_plain(summary), allow_nan=False))
+        print(json.dumps(plain_summary(summary), allow_nan=False))
     else:
-        _print(summary, args.out)
+        print_summary(summary, args.out)
     return 0
 
 
@@ -277,27 +280,33 @@ def _executor(args: SweepFlags, cfg: CampaignCfg) -> Executor:
     return ProcessExecutor(min(args.workers or usable_cores(), cfg.episodes), cfg.wall_limit_s)
 
 
-def _plain(summary: CampaignSummary) -> dict[str, Any]:
+def plain_summary(summary: CampaignSummary) -> dict[str, Any]:
+    """A campaign's outcome as `--json` prints it: the rate is over `episodes`, `lost` ones come on top by cause."""
     return {
         "success_rate": summary.rate.rate,
         "ci_low": summary.rate.low,
         "ci_high": summary.rate.high,
         "episodes": summary.rate.episodes,
         "failures": summary.failures,
+        "lost": summary.lost,
         "wall_s": summary.wall_s,
         "peak_rss_mb": summary.peak_rss_mb,
     }
 
 
-def _print(summary: CampaignSummary, out: Path) -> None:
-    table = Table(title=f"campaign of {summary.rate.episodes} episodes", title_justify="left")
+def print_summary(summary: CampaignSummary, out: Path) -> None:
+    """A campaign's outcome as a table on standard output."""
+    rate = summary.rate
+    table = Table(title=f"campaign of {rate.episodes + rate.lost} episodes", title_justify="left")
     table.add_column("metric")
     table.add_column("value", justify="right")
-    rate = summary.rate
-    table.add_row("success rate", f"{100.0 * (rate.rate or 0.0):.1f} %")
+    share = "-" if rate.rate is None else f"{100.0 * rate.rate:.1f} %"
+    table.add_row(f"success rate of {rate.episodes} with a result" if rate.lost else "success rate", share)
     table.add_row("95 % interval (Wilson)", f"{100.0 * rate.low:.1f} to {100.0 * rate.high:.1f} %")
     for cause, count in summary.failures.items():
         table.add_row(f"failed: {cause}", str(count))
+    for cause, count in summary.lost.items():
+        table.add_row(f"[red]NO RESULT: {cause} (in no rate)[/red]", f"[red]{count}[/red]")
     table.add_row("run now", str(summary.ran))
     table.add_row("wall-clock time", f"{summary.wall_s:.0f} s")
     table.add_row("peak memory", f"{summary.peak_rss_mb:.0f} MiB")

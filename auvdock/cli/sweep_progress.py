@@ -68,7 +68,8 @@ class SweepProgress:
         left = _clock((self._planned - tally.episodes) / rate) if rate > 0.0 else "?"
         found = tally.rate
         success = f"success {100.0 * (found.rate or 0.0):.1f} % [{100.0 * found.low:.1f}, {100.0 * found.high:.1f}]"
-        return f"{tally.episodes}/{self._planned} episodes  {rate:.2f}/s  {left} left  {success}"
+        lost = f"  {tally.lost} WITHOUT RESULT" if tally.lost else ""
+        return f"{tally.episodes}/{self._planned} episodes  {rate:.2f}/s  {left} left  {success}{lost}"
 
 
 def _clock(seconds: float) -> str:

@@ -23,14 +23,17 @@ def row(spec, success, reason="near"):
 
 @dataclass(frozen=True)
 class Bernoulli:
-    """Succeeds with a known probability; `pause_s` makes it last, `log` tells who ran it."""
+    """Succeeds with a known probability; `pause_s` makes it last, `log` tells who ran it, each n-th may raise."""
 
     probability: float
     pause_s: float = 0.0
     log: str = ""
+    raise_every: int = 0
 
     def build(self):
         def run(spec):
+            if self.raise_every and spec.episode % self.raise_every == 0:
+                raise ZeroDivisionError("no light")
             if self.pause_s:
                 time.sleep(self.pause_s)
             if self.log:

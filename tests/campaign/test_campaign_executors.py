@@ -1,12 +1,13 @@
 """Executors: the same rows everywhere; deaths, hangs and exceptions stay the episode's own."""
 
 import dataclasses
+from pathlib import Path
 
 import pytest
 from campaign_jobs import Bernoulli, ByCell, Raising, Troubled
 
 from auvdock.campaign.axes import AxisCfg
-from auvdock.campaign.campaign import Tally, run_campaign
+from auvdock.campaign.campaign import CampaignSummary, Tally, run_campaign
 from auvdock.campaign.config import CampaignCfg
 from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.executor import SerialExecutor
@@ -16,6 +17,7 @@ from auvdock.campaign.process import ProcessExecutor
 from auvdock.campaign.provenance import manifest_of
 from auvdock.campaign.statistics import wilson
 from auvdock.campaign.store import Store, read_table
+from auvdock.cli.sweep import plain_summary, print_summary
 from auvdock.core.errors import ConfigError
 
 AXES = (AxisCfg("current", low=0.0, high=0.5, count=3), AxisCfg("attenuation", low=0.2, high=1.2))
@@ -84,7 +86,9 @@ def test_deaths_hangs_and_exceptions_cost_one_episode_each(tmp_path):
     assert "signal 9" in rows[1]["error"]
     assert "3 s" in rows[3]["error"]
     assert rows[4]["error"] == "ZeroDivisionError: no light"
-    assert summary.failures == {"crashed": 2, "hung": 1}
+    assert summary.failures == {}
+    assert summary.lost == {"crashed": 2, "hung": 1}
+    assert summary.rate == wilson(9, 9, lost=3)
     assert summary.ran == 12
 
 
@@ -128,7 +132,7 @@ def test_the_adaptive_stop_ends_at_the_first_prefix_that_is_known_well_enough(tm
     assert [row["episode"] for row in rows] == list(range(len(rows)))
     earlier = Tally()
     for row in rows[:-100]:
-        earlier.add(row["success"] is True, False)
+        earlier.add(row["success"] is True, row["failure_reason"])
     assert earlier.rate.half_width > 0.03
     assert len(rows) < 700  # of 5,000
     interrupted = CampaignCfg(episodes=130, until_ci=0.03)
@@ -166,3 +170,29 @@ def test_a_cell_gets_its_share_of_the_episodes_and_no_more(tmp_path):
 def test_cells_without_a_width_to_reach_are_refused():
     with pytest.raises(ConfigError, match="until_ci"):
         CampaignCfg(until_ci_per_cell=True)
+
+
+def test_a_row_without_a_result_neither_narrows_nor_shifts_the_adaptive_stop(tmp_path):
+    """Every fourth episode raises: the campaign stops as soon as those that were flown are known well enough."""
+    cfg = CampaignCfg(episodes=2000, until_ci=0.03)
+    summary, rows = swept(tmp_path, cfg, Bernoulli(1.0, raise_every=4), SerialExecutor(60.0))
+    flown = sum(row["error"] is None for row in rows)
+    assert (summary.rate, summary.lost) == (
+        wilson(flown, flown, lost=len(rows) - flown),
+        {"crashed": len(rows) - flown},
+    )
+    assert summary.rate.half_width <= 0.03 < wilson(flown - 75, flown - 75).half_width
+
+
+def test_the_sweep_says_loudly_what_left_no_result(capsys):
+    rate = wilson(3, 4, lost=2)
+    summary = CampaignSummary(rate, {"near": 1}, {"crashed": 2}, 6, 1.0, 100.0)
+    print_summary(summary, Path("out"))
+    told = capsys.readouterr().out
+    assert "campaign of 6 episodes" in told
+    assert "success rate of 4 with a result" in told
+    assert "75.0 %" in told
+    assert "NO RESULT: crashed" in told
+    plain = plain_summary(summary)
+    assert (plain["success_rate"], plain["episodes"], plain["lost"]) == (0.75, 4, {"crashed": 2})
+    assert plain["failures"] == {"near": 1}

@@ -16,9 +16,10 @@ from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.executor import SerialExecutor
 from auvdock.campaign.report.cells import load, success_map
 from auvdock.campaign.report.compare import compare
-from auvdock.campaign.report.figures import cause_figure, distribution_figure
+from auvdock.campaign.report.figures import cause_figure, distribution_figure, map_figure
 from auvdock.campaign.report.page import html_page, recording_path
 from auvdock.campaign.report.tables import csv_table, latex_table
+from auvdock.campaign.row import RESULT_COLUMNS
 from auvdock.campaign.statistics import wilson
 from auvdock.cli.main import main
 from auvdock.episode.result import FAILURE_REASONS
@@ -77,6 +78,7 @@ def test_the_page_tells_rate_interval_and_every_failure(campaign):
     rate = wilson(successes, 120)
     assert f"{100 * successes / 120:.1f} %" in page
     assert f"{100 * rate.low:.1f} to {100 * rate.high:.1f} %" in page
+    assert "crashed or hung" not in page
     for row in campaign.rows:
         assert (f"#{row['episode']}&#x27;" in page) == (not row["success"] or row["episode"] == 0)
 
@@ -98,6 +100,51 @@ def test_every_cause_of_failure_can_be_drawn(campaign):
     rows = [{**row, "failure_reason": cause} for row, cause in zip(failed, FAILURE_REASONS, strict=False)]
     drawn = cause_figure(replace(campaign, rows=rows))
     assert all(f">{cause}<" in drawn for cause in FAILURE_REASONS)
+
+
+@pytest.fixture(scope="module")
+def troubled(campaign):
+    """The same campaign, of which every ninth episode crashed or hung."""
+    nothing = dict.fromkeys(RESULT_COLUMNS) | {"success": False, "error": "ZeroDivisionError: no light"}
+    reasons = {0: "crashed", 9: "hung"}
+    rows = [
+        {**row, **nothing, "failure_reason": reasons[place % 18]} if place % 9 == 0 else row
+        for place, row in enumerate(campaign.rows)
+    ]
+    return replace(campaign, rows=rows)
+
+
+def test_lost_episodes_are_told_and_enter_no_rate(campaign, troubled):
+    """Page, map, CSV and LaTeX: as of the others alone, with how many are lost beside it."""
+    left = replace(campaign, rows=[row for row in troubled.rows if row["error"] is None])
+    lost = len(campaign.rows) - len(left.rows)
+    assert (troubled.rate.lost, troubled.rate.episodes) == (lost, len(left.rows))
+    assert (troubled.rate.rate, troubled.rate.low) == (left.rate.rate, left.rate.low)
+    page = html_page(troubled, None)
+    assert f">{lost}</span></b>crashed or hung" in page
+    assert f"<b>{left.rate.episodes}</b>episodes with a result" in page
+    for line, clean in zip(*(csv.DictReader(io.StringIO(csv_table(one))) for one in (troubled, left)), strict=True):
+        for name in ("episodes", "successes", "success_rate", "ci_low", "ci_high"):
+            assert line[name] == clean[name]
+        assert int(line["lost"]) == int(line["failed_crashed"]) + int(line["failed_hung"])
+        assert clean["lost"] == "0"
+    whole, found = success_map(left), success_map(troubled)
+    assert whole is not None
+    assert found is not None
+    for line, clean in zip(found.rates, whole.rates, strict=True):
+        assert [replace(rate, lost=0) for rate in line] == clean
+    assert sum(rate.lost for line in found.rates for rate in line) == lost
+    assert " lost" in map_figure(found)
+    assert " lost" not in map_figure(whole)
+    assert f"and {lost} without a result" in latex_table(troubled)
+
+
+def test_pairs_with_a_lost_episode_are_left_out_and_told(campaign, troubled):
+    found = compare(troubled, campaign)
+    assert found.lost == troubled.rate.lost
+    assert found.test.pairs == 120 - found.lost
+    assert (found.test.only_first, found.test.only_second, found.changed) == (0, 0, [])
+    assert f"Left out: {found.lost} pairs" in html_page(troubled, found)
 
 
 def test_only_what_the_station_has_is_drawn(campaign):

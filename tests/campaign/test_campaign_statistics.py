@@ -1,5 +1,7 @@
 """Intervals and tests against outside references, and the intervals' coverage."""
 
+import dataclasses
+
 import pytest
 from campaign_jobs import Bernoulli
 from hypothesis import given
@@ -9,7 +11,10 @@ from scipy.stats import binom, binomtest
 from auvdock.campaign.config import CampaignCfg
 from auvdock.campaign.executor import SerialExecutor
 from auvdock.campaign.plan import Plan
+from auvdock.campaign.report.cells import rate_of
+from auvdock.campaign.row import Row
 from auvdock.campaign.statistics import mcnemar, wilson
+from auvdock.episode.result import LOST_REASONS
 
 
 @given(st.integers(1, 3000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
@@ -19,6 +24,15 @@ def test_wilson_is_scipy_s(counts):
     found = wilson(successes, episodes)
     assert (found.low, found.high) == pytest.approx((reference.low, reference.high), abs=1e-12)
     assert found.low <= successes / episodes <= found.high
+
+
+@given(st.integers(0, 30), st.integers(0, 30), st.lists(st.sampled_from(LOST_REASONS), max_size=30))
+def test_what_left_no_result_moves_no_rate_and_is_told(successes, failures, lost):
+    flown: list[Row] = [{"success": True, "failure_reason": None}] * successes
+    flown += [{"success": False, "failure_reason": "near"}] * failures
+    found = rate_of([*flown, *({"success": False, "failure_reason": reason} for reason in lost)])
+    assert dataclasses.replace(found, lost=0) == rate_of(flown) == wilson(successes, successes + failures)
+    assert found.lost == len(lost)
 
 
 def test_without_episodes_everything_is_possible():

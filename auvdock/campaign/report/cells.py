@@ -10,7 +10,7 @@ from typing import Any
 
 from auvdock.campaign.axes import AxisCfg, AxisValue
 from auvdock.campaign.config import CampaignCfg
-from auvdock.campaign.row import Row
+from auvdock.campaign.row import Row, outcome
 from auvdock.campaign.statistics import Rate, wilson
 from auvdock.campaign.store import read_campaign, read_manifest, read_table
 
@@ -54,7 +54,7 @@ class Campaign:
 
     @property
     def rate(self) -> Rate:
-        """Over all episodes."""
+        """Over all episodes that left a result."""
         return rate_of(self.rows)
 
 
@@ -68,8 +68,10 @@ def load(folder: Path) -> Campaign:
 
 
 def rate_of(rows: Sequence[Row]) -> Rate:
-    """Success rate of some rows."""
-    return wilson(sum(row["success"] is True for row in rows), len(rows))
+    """Success rate of some rows, over those that left a result."""
+    found = [outcome(row) for row in rows]
+    lost = found.count(None)
+    return wilson(found.count(True), len(found) - lost, lost=lost)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.report.cells import Campaign
-from auvdock.campaign.row import Row
+from auvdock.campaign.row import Row, outcome
 from auvdock.campaign.statistics import McNemar, mcnemar
 
 __all__ = ["Comparison", "compare"]
@@ -21,12 +21,14 @@ class Comparison:
         second: the one that it is held against.
         test: on the pairs.
         changed: pairs with different outcomes, first's and second's row.
+        lost: pairs beside these of which one episode or both left no result.
     """
 
     first: Campaign
     second: Campaign
     test: McNemar
     changed: list[tuple[Row, Row]]
+    lost: int
 
 
 def compare(first: Campaign, second: Campaign) -> Comparison:
@@ -45,9 +47,10 @@ def compare(first: Campaign, second: Campaign) -> Comparison:
                     f"{second.folder}: episode {one['episode']} has {name} {other[name]}, in {first.folder} it is "
                     f"{one[name]}; only campaigns of one seed and the same grid can be compared"
                 )
-    if not pairs:
-        raise CampaignError(f"{second.folder}: shares no finished episode with {first.folder}")
-    outcomes = [(one["success"] is True, other["success"] is True) for one, other in pairs]
+    flown = [pair for pair in pairs if None not in (outcome(pair[0]), outcome(pair[1]))]
+    if not flown:
+        raise CampaignError(f"{second.folder}: shares no episode that left a result with {first.folder}")
+    outcomes = [(outcome(one), outcome(other)) for one, other in flown]
     test = mcnemar(*(outcomes.count(kind) for kind in ((True, True), (True, False), (False, True), (False, False))))
-    changed = [pair for pair, (one, other) in zip(pairs, outcomes, strict=True) if one != other]
-    return Comparison(first, second, test, changed)
+    changed = [pair for pair, (one, other) in zip(flown, outcomes, strict=True) if one != other]
+    return Comparison(first, second, test, changed, len(pairs) - len(flown))

@@ -37,7 +37,7 @@ th, td { text-align: left; padding: .3rem .8rem .3rem 0; border-bottom: 1px soli
 th { color: var(--muted); font-weight: 600; } .scroll { overflow-x: auto; max-height: 32rem; overflow-y: auto; }
 code { font: .85em ui-monospace, Menlo, Consolas, monospace; background: #f2f5f7; padding: .1em .3em;
   border-radius: 4px; }
-a { color: var(--accent); } @media print { .scroll { max-height: none; } }
+.lost { color: #b3262e; } a { color: var(--accent); } @media print { .scroll { max-height: none; } }
 """
 
 
@@ -57,7 +57,7 @@ def html_page(campaign: Campaign, comparison: Comparison | None) -> str:
         _axes(campaign),
         "<h2>Why episodes failed</h2>",
         "<p>The guidance stage in which the pilot gave up or time ran out, or what ended the episode.</p>",
-        f"<figure>{cause_figure(campaign)}</figure>" if campaign.rate.successes < campaign.rate.episodes else "",
+        f"<figure>{cause_figure(campaign)}</figure>" if campaign.rate.successes < len(campaign.rows) else "",
         _causes(campaign),
         "<h2>Distributions</h2>",
         f"<figure>{distribution_figure(campaign.rows)}</figure>" if campaign.rows else "",
@@ -100,11 +100,13 @@ def _axis_words(campaign: Campaign) -> list[str]:
 
 def _headline(campaign: Campaign) -> str:
     rate = campaign.rate
+    lost = [(f'<span class="lost">{rate.lost}</span>', "crashed or hung: no result, in no rate")] if rate.lost else []
     items = [
         (_percent(rate.rate), "success rate"),
         (f"{100 * rate.low:.1f} to {100 * rate.high:.1f} %", "Wilson 95 % interval"),
-        (str(rate.episodes), "episodes"),
+        (str(rate.episodes), "episodes with a result" if rate.lost else "episodes"),
         (str(rate.episodes - rate.successes), "failures"),
+        *lost,
         *_false_poses(campaign.rows),
     ]
     return '<ul class="figures">' + "".join(f"<li><b>{value}</b>{name}</li>" for value, name in items) + "</ul>"
@@ -158,10 +160,11 @@ def _comparison(found: Comparison) -> str:
         for one_row, two in found.changed[:LISTED]
     ]
     listing = _table(("episode", "here", "in the other"), changed) if changed else ""
+    lost = f" Left out: {found.lost} pairs in which an episode crashed or hung." if found.lost else ""
     return (
         f"<h2>Against {other}</h2>\n<p>{test.pairs} pairs of equal seed. {one}: {_rate(found.first.rate)}; the other: "
         f"{_rate(found.second.rate)}. Difference over the pairs: {points} (95 %, Newcombe's paired interval). "
-        f"McNemar's exact test: p = {verdict}.</p>\n{square}\n{listing}"
+        f"McNemar's exact test: p = {verdict}.{lost}</p>\n{square}\n{listing}"
     )
 
 
@@ -183,7 +186,8 @@ def _failures(campaign: Campaign) -> str:
     ]
     more = f'<p class="muted">The first {LISTED} of {len(failed)}.</p>' if len(failed) > LISTED else ""
     head = ("episode", "cause", *(escape(name) for name in names), "time, s", "recording", "")
-    return f"<h2>Failures</h2>\n{more}{_table(head, lines, raw=True)}"
+    title = "Failures and lost episodes" if campaign.rate.lost else "Failures"
+    return f"<h2>{title}</h2>\n{more}{_table(head, lines, raw=True)}"
 
 
 def _link(folder: Path, row: Row) -> str:
@@ -222,7 +226,8 @@ def _table(head: Sequence[str], lines: Sequence[Sequence[str]], raw: bool = Fals
 
 
 def _rate(rate: Rate) -> str:
-    return f"{_percent(rate.rate)} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
+    lost = f" and {rate.lost} without a result" if rate.lost else ""
+    return f"{_percent(rate.rate)} [{100 * rate.low:.1f}, {100 * rate.high:.1f}] of {rate.episodes} episodes{lost}"
 
 
 def _percent(share: float | None) -> str:

@@ -25,7 +25,10 @@ MEDIANS = (
 
 
 def csv_table(campaign: Campaign) -> str:
-    """One line per cell of all axes: counts, rate, Wilson 95 % interval, sums, medians, failures by cause."""
+    """One line per cell of all axes: counts, rate, Wilson 95 % interval, sums, medians, failures by cause.
+
+    `episodes` are those that left a result, over which the rate is; `lost` are the others.
+    """
     cuts = [binning(axis) for axis in campaign.cfg.axes]
     cells: dict[tuple[int, ...], list[Row]] = defaultdict(list)
     for row in campaign.rows:
@@ -36,7 +39,8 @@ def csv_table(campaign: Campaign) -> str:
     medians = [f"median_{name}" for name in MEDIANS]
     causes = [f"failed_{name}" for name in FAILURE_REASONS]
     names = [cut.name for cut in cuts]
-    writer.writerow([*names, "episodes", "successes", "success_rate", "ci_low", "ci_high", *totals, *medians, *causes])
+    figures = ("episodes", "lost", "successes", "success_rate", "ci_low", "ci_high")
+    writer.writerow([*names, *figures, *totals, *medians, *causes])
     for places, rows in sorted(cells.items()):
         rate = rate_of(rows)
         ticks = [cut.ticks[place] for cut, place in zip(cuts, places, strict=True)]
@@ -45,7 +49,8 @@ def csv_table(campaign: Campaign) -> str:
         failed = [sum(row["failure_reason"] == name for row in rows) for name in FAILURE_REASONS]
         share = "" if rate.rate is None else f"{rate.rate:.6g}"
         interval = (f"{rate.low:.6g}", f"{rate.high:.6g}")
-        writer.writerow([*ticks, rate.episodes, rate.successes, share, *interval, *summed, *middle, *failed])
+        counted = (rate.episodes, rate.lost, rate.successes)
+        writer.writerow([*ticks, *counted, share, *interval, *summed, *middle, *failed])
     return buffer.getvalue()
 
 
@@ -53,8 +58,9 @@ def latex_table(campaign: Campaign) -> str:
     """The success map as a booktabs table: rate and Wilson 95 % interval in percent."""
     found = success_map(campaign)
     title = _escape(campaign.cfg.name)
+    lost = f" and {campaign.rate.lost} without a result, which count in no rate" if campaign.rate.lost else ""
     caption = (
-        f"Success rate in \\% with Wilson 95\\,\\% interval, {campaign.rate.episodes} episodes"
+        f"Success rate in \\% with Wilson 95\\,\\% interval, {campaign.rate.episodes} episodes{lost}"
         f" ({title}, seed {campaign.cfg.seed})."
     )
     if found is None:
