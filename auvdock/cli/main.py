@@ -49,6 +49,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.landing_trials:run_landing_trials",
         "paper C's ten landings beside ours, each level alone and both",
     ),
+    ("reproduce", "halo"): (
+        "auvdock.cli.reproduce_halo:run_halo",
+        "the light about a lamp against single photons",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("fit-landing",): (
