@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.optimize import root_scalar
 
 from auvdock.assets import asset, asset_names
 from auvdock.core.arrays import Array
@@ -124,12 +125,12 @@ def _particles(name: str) -> tuple[float, float]:
         raise ConfigError("phase", name, f"{FOURNIER_FORAND}R with a backscatter ratio R of 0.002 to 0.1")
     if ratio == 0.018:
         return 1.10, 3.5835
-    # Backscattering grows with the index and the slope along the line: bisection.
-    low, high = 3.05, 4.9
-    for _ in range(60):
-        slope = 0.5 * (low + high)
-        low, high = (slope, high) if _backscatter_ratio(_index(slope), slope) < ratio else (low, slope)
-    return _index(low), low
+
+    def excess(slope: float) -> float:
+        return _backscatter_ratio(_index(slope), slope) - ratio
+
+    slope = float(root_scalar(excess, bracket=(3.05, 4.9)).root)
+    return _index(slope), slope
 
 
 def _index(slope: float) -> float:
