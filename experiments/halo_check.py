@@ -72,7 +72,7 @@ def check_halo(name: str, photons: int, seed: int, told: Callable[[], object]) -
 
     Args:
         name: of the phase function.
-        photons: how many, in ten batches.
+        photons: how many, in ten batches of the same size.
         seed: other than the table's, which is 0.
         told: called after each batch.
     """
@@ -93,7 +93,7 @@ def check_halo(name: str, photons: int, seed: int, told: Callable[[], object]) -
     wells = [[halo_table(theta0).encircled(br, read) for br in CHECKED_BR] for theta0 in WELLS_RAD]
     return HaloCheck(
         name,
-        photons,
+        photons // _BATCHES * _BATCHES,
         fresh,
         np.nan_to_num(error, nan=np.inf),
         np.array(table),

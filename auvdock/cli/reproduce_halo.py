@@ -30,7 +30,7 @@ from auvdock.experiments.halo_check import (
 from auvdock.experiments.halo_picture import draw_halo
 from auvdock.optics.photons.making import BATCHES, count_photons, make_grid
 from auvdock.optics.photons.phase import load_phase
-from auvdock.optics.photons.table import save_halo
+from auvdock.optics.photons.table import load_halo, save_halo
 from auvdock.optics.water import load_water, with_attenuation
 from auvdock.planning.pictures import make_folder
 
@@ -48,7 +48,7 @@ class Halo:
     """Light scattered about a lamp: a table made by single photons against photons sent out afresh, and what is flown.
 
     With --water and --range it tells what arrives in that one case. With --make-table it makes tables instead.
-    Exit code: 1 if the table is off by more than 10 % where the fresh photons can tell, else 0.
+    Exit code: 1 if the table is off by more than 10 % where the fresh photons can tell, or they never can; else 0.
     """
 
     water: str | None = None
@@ -88,6 +88,8 @@ def run_halo(argv: Sequence[str], prog: str) -> int:
     phases = args.phases or PHASES
     for phase in phases:
         load_phase(phase)
+        if args.make_table is None:
+            load_halo(phase)
     folder = args.out if args.make_table is None else args.make_table
     if folder is not None:
         make_folder(folder)
@@ -113,7 +115,7 @@ def run_halo(argv: Sequence[str], prog: str) -> int:
         print(json.dumps({"target": 0.1, "phases": rows}, allow_nan=False))
     else:
         _print(rows)
-    return 0 if all(row["greatest_deviation"] <= 0.1 for row in rows) else 1
+    return 0 if all(row["judged"] and row["greatest_deviation"] <= 0.1 for row in rows) else 1
 
 
 def _case(args: Halo, name: str) -> int:
@@ -197,8 +199,9 @@ def _verdict(check: HaloCheck) -> dict[str, Any]:
         "rms_deviation": float(np.sqrt(np.mean(off[judged] ** 2))) if judged.any() else 0.0,
         "greatest_table_error": float(check.table_error.max()),
         "table_over_photons": [
-            {"scattering_depth": br, "least": float(r[j].min(initial=1.0)), "most": float(r[j].max(initial=1.0))}
-            for br, r, j in zip(CHECKED_BR, check.ratio, judged, strict=True)
+            {"scattering_depth": br, "least": float(ratio[known].min()), "most": float(ratio[known].max())}
+            for br, ratio, known in zip(CHECKED_BR, check.ratio, judged, strict=True)
+            if known.any()
         ],
         "wells_over_photons": [
             {"scattering_angle_rad": theta0, "least": float(w[judged].min()), "most": float(w[judged].max())}

@@ -72,6 +72,7 @@ def test_a_small_check_says_what_it_could_judge(capsys, tmp_path):
         ["--photons", "3"],
         ["--seed", "-1"],
         ["--phases", "henyey"],
+        ["--phases", "fournier-forand-0.03"],
     ],
 )
 def test_what_cannot_be_used_is_one_line(words, capsys):
