@@ -120,12 +120,18 @@ def _within(moments: Array, photons: int) -> Array:
     radiance = moments[0] / (photons * facing)
     inner = slice(1, _EVEN)
     radiance[..., inner] = _smoothed(moments[..., inner], photons * facing[inner])
-    # The cap inside the first ring holds few photons: the power law of the first rings goes on.
+    # In the cap light peaks more than its neighbours tell: their power law counts as much as three photons there.
     first, second = radiance[..., 1], radiance[..., 2]
     step = math.log(ANGLE_RAD[1] / ANGLE_RAD[0])
     with np.errstate(divide="ignore", invalid="ignore"):
         fall = np.clip(np.nan_to_num(np.log(first / second) / step), 0.0, 1.5)
-    radiance[..., 0] = first * 2.0 / (2.0 - fall)
+        one = np.nan_to_num(np.divide(*moments[::-1, ..., inner].sum(axis=-1)))
+    guess, prior = first * 2.0 / (2.0 - fall), 3.0 * one
+    told = prior > 0.0
+    exposure = photons * facing[0]
+    radiance[..., 0] = np.where(
+        told, (moments[0, ..., 0] + prior) / (exposure + prior / np.where(told, guess, 1.0)), radiance[..., 0]
+    )
     return np.cumsum(radiance * solid, axis=-1)
 
 
