@@ -14,6 +14,7 @@ import tyro
 from auvdock.core.errors import ConfigError, GraphicsError
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.optics.gl import probe_gl
+from auvdock.sim.mj import GL_REFUSAL
 
 __all__ = ["DockFlags"]
 
@@ -92,7 +93,8 @@ def _working_fidelity() -> str:
     try:
         probe_gl()
     except GraphicsError as error:
-        print(f"auvdock: {error}", file=sys.stderr)
+        if GL_REFUSAL is None:  # of which every command tells
+            print(f"auvdock: {error}", file=sys.stderr)
         return "beacons"
     return "pixels"
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from importlib import import_module
 
+from auvdock.cli.notices import told_once, unusable_gl
 from auvdock.core.errors import AuvdockError
 from auvdock.core.memory import relax_collector
 
@@ -80,8 +81,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         relax_collector()
         from auvdock.core.compiled import compiling  # half a second, not for a usage message
 
-        with nullcontext() if "--json" in words else compiling(_tell_of_compiling):
-            return run(words[len(command) :], "auvdock " + " ".join(command))
+        with told_once(), nullcontext() if "--json" in words else compiling(_tell_of_compiling):
+            code = run(words[len(command) :], "auvdock " + " ".join(command))
+        unusable_gl()
+        return code
     except AuvdockError as error:
         print(f"auvdock: error: {error}", file=sys.stderr)
         return 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["AuvdockError", "ConfigError", "GraphicsError"]
+__all__ = ["AuvdockError", "AuvdockWarning", "ConfigError", "GraphicsError"]
 
 
 class AuvdockError(Exception):
@@ -32,3 +32,7 @@ class ConfigError(AuvdockError):
 
 class GraphicsError(AuvdockError):
     """No OpenGL context could be had for offscreen rendering."""
+
+
+class AuvdockWarning(UserWarning):
+    """What works all the same but may want to be put right; the command line prints it on one line."""
