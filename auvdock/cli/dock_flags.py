@@ -32,7 +32,7 @@ class DockFlags(ABC):
     controller: str | None = None
     """A pilot of your own as package.module:Name, in place of the station's."""
     water: str | None = None
-    """Water preset: I, IA, IB, II, III, 1C to 9C, clear, pool, lake."""
+    """Water preset (I, IA, IB, II, III, 1C to 9C, clear, pool, lake), or a TOML file written as assets/waters are."""
     attenuation: float | None = None
     """Beam attenuation at 450 nm in 1/m, in place of the preset's."""
     current: float | None = None
@@ -43,6 +43,8 @@ class DockFlags(ABC):
     """Difficulty 0 to 4; the flags change single things of it."""
     config: Path | None = None
     """TOML file with further settings, on top of the level."""
+    station: str | None = None
+    """TOML file of a station in place of the level's, written as assets/stations are; `auvdock plan` writes such."""
     record: Path | None = None
     """Write a Rerun recording here."""
     json: bool = False
