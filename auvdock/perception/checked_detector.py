@@ -51,7 +51,8 @@ class CheckedDetector:
             numbers = np.ascontiguousarray(values, dtype=np.float64)
         except (TypeError, ValueError) as error:
             self._refuse(frame, f"{name} as an array of numbers ({error})")
-        self._demand(frame, name, numbers, np.isfinite(numbers).reshape(len(numbers), -1).all(axis=1), "finite numbers")
+        finite = np.isfinite(numbers).all(axis=tuple(range(1, numbers.ndim)))
+        self._demand(frame, name, numbers, finite, "finite numbers")
         return numbers
 
     def _demand(self, frame: Frame, name: str, values: Any, right: Any, remedy: str) -> None:  # noqa: ANN401

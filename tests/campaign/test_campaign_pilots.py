@@ -56,8 +56,8 @@ def test_pilots_are_an_axis_and_a_flag(tmp_path, capsys):
 
 
 def test_a_name_with_a_colon_is_no_range():
-    assert parse_axis("controller", "a.b:C,own") == AxisCfg("controller", ("a.b:C", "own"))
-    assert parse_axis("detector", "a.b:C") == AxisCfg("detector", ("a.b:C",))
+    assert parse_axis("controller", "a.b:C,own", str) == AxisCfg("controller", ("a.b:C", "own"))
+    assert parse_axis("detector", "a.b:C", str) == AxisCfg("detector", ("a.b:C",))
 
 
 @pytest.mark.parametrize("station", STATIONS)
