@@ -45,9 +45,8 @@ def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None
     doc = (cls.__doc__ or "").strip()
     # What a configuration may leave out (a rotating beacon) shall give flags where it is there, never subcommands.
     config = (tyro.conf.AvoidSubcommands,)
-    more = {} if default is None else {"default": default}
-    registry = _registry()
-    given = tyro.cli(cls, args=list(argv), prog=prog, description=doc, config=config, registry=registry, **more)
+    read = partial(tyro.cli, cls, args=list(argv), prog=prog, description=doc, config=config, registry=_registry())
+    given: T = read() if default is None else read(default=default)
     try:
         return recheck(given)
     except ConfigError as error:  # an episode's settings are flags of their own, without its name before them

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 __all__ = ["AuvdockError", "ConfigError", "GraphicsError", "located"]
@@ -42,7 +42,7 @@ class GraphicsError(AuvdockError):
 
 
 @contextmanager
-def located(path: str) -> Iterator[None]:
+def located(path: str) -> Generator[None]:
     """Put `path` ("world.start.") before the field of every `ConfigError` that is raised inside."""
     try:
         yield
