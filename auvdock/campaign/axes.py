@@ -15,7 +15,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.strict import setting_type
 from auvdock.episode.config import AnyEpisodeCfg
 
-__all__ = ["ALIASES", "DISTRIBUTIONS", "WATER_AXES", "AxisCfg", "AxisValue", "axis_kind", "nested", "parse_axis"]
+__all__ = ["ALIASES", "DISTRIBUTIONS", "KIND_WORDS", "WATER_AXES", "AxisCfg", "AxisValue", "axis_kind", "nested"]
 
 AxisValue = float | int | str | bool
 """What an axis can set."""
@@ -50,7 +50,7 @@ WATER_AXES = ("water", "world.water")
 DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 """`normal` has 95 % of its mass between low and high and is cut off there."""
 
-_WORDS: Mapping[type[AxisValue], str] = {
+KIND_WORDS: Mapping[type[AxisValue], str] = {
     float: "finite numbers",
     int: "whole numbers",
     bool: "true or false",
@@ -152,7 +152,7 @@ class AxisCfg:
             return number
         if kind is int and number.is_integer():
             return int(number)
-        raise ConfigError(self.name, value, f"{_WORDS[kind]}, as this setting is")
+        raise ConfigError(self.name, value, f"{KIND_WORDS[kind]}, as this setting is")
 
     def changes(self, value: AxisValue) -> dict[str, Any]:
         """The nested change of an episode's configuration that `value` stands for; nothing for `level`."""
@@ -193,64 +193,10 @@ def axis_kind(episode: type[AnyEpisodeCfg], name: str) -> type[AxisValue]:
         raise ConfigError(name, name, f"{known}, or a dotted setting such as world.start.heading_deg")
     hint = setting_type(episode, ALIASES.get(name, (name,))[0])
     options = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    for kind in _WORDS:
+    for kind in KIND_WORDS:
         if kind in options:
             return kind
     raise ConfigError(name, name, "a setting that is one number, one text or one truth value")
-
-
-def parse_axis(name: str, text: str, kind: type[AxisValue]) -> AxisCfg:
-    """An axis from a flag: `low:high:count` is a grid, `low:high` a distribution, `a,b,c` or one value a list.
-
-    Text is always a list: its colons are those of "package.module:Name".
-
-    Raises:
-        ConfigError: text that is none of these, or values that are not of the setting's type (`axis_kind`).
-    """
-    try:
-        return _parsed(name, text, kind)
-    except ConfigError as error:
-        raise ConfigError(name, text, error.remedy) from error
-
-
-def _parsed(name: str, text: str, kind: type[AxisValue]) -> AxisCfg:
-    remedy = "low:high:count, low:high, or values with commas between them"
-    parts = text.split(":")
-    if len(parts) == 1 or kind in (str, bool):
-        return AxisCfg(name, tuple(_value(part.strip(), name, kind, remedy) for part in text.split(",")))
-    if len(parts) > 3:
-        raise ConfigError(name, text, remedy)
-    try:
-        low, high = float(parts[0]), float(parts[1])
-        count = int(parts[2]) if len(parts) == 3 else 0
-    except ValueError as error:
-        raise ConfigError(name, text, remedy) from error
-    if len(parts) == 3 and low == high and count == 1:
-        return AxisCfg(name, (low,))
-    if len(parts) == 3 and count < 2:
-        raise ConfigError(name, text, "a count of 2 or more")
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ConfigError(name, text, "finite numbers with low below high")
-    return AxisCfg(name, low=low, high=high, count=count)
-
-
-def _value(text: str, name: str, kind: type[AxisValue], remedy: str) -> AxisValue:
-    if not text:
-        raise ConfigError(name, text, remedy)
-    if kind is str:
-        return text
-    wrong = ConfigError(name, text, f"{_WORDS[kind]}, as this setting is")
-    if kind is bool:
-        if text not in ("true", "false"):
-            raise wrong
-        return text == "true"
-    try:
-        number = int(text) if kind is int else float(text)
-    except ValueError as error:
-        raise wrong from error
-    if not math.isfinite(number):
-        raise wrong
-    return number
 
 
 def _kind(value: AxisValue) -> type[AxisValue]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -73,10 +74,9 @@ class DockFlags(ABC):
         if self.water is not None:
             world["water"] = self.water
         if self.attenuation is not None:
-            world["attenuation_per_m"] = _finite("attenuation", self.attenuation, "a finite attenuation in 1/m")
+            world["attenuation_per_m"] = self.attenuation
         if self.current is not None:
-            speed = _finite("current", self.current, "a finite speed in m/s")
-            world.setdefault("sim", {}).setdefault("current", {})["speed_m_s"] = speed
+            world.setdefault("sim", {}).setdefault("current", {})["speed_m_s"] = self.current
         if self.current_direction is not None:
             start = world.setdefault("start", {})
             start["random_current_direction"] = self.current_direction == "random"
@@ -99,14 +99,8 @@ def _working_fidelity() -> str:
     return "pixels"
 
 
-def _finite(name: str, value: float, remedy: str) -> float:
-    if not math.isfinite(value):
-        raise ConfigError(name, value, remedy)
-    return value
-
-
 def _degrees(text: str) -> float:
-    try:
-        return _finite("current-direction", float(text), "degrees or 'random'")
-    except ValueError as error:
-        raise ConfigError("current-direction", text, "degrees or 'random'") from error
+    with suppress(ValueError):
+        if math.isfinite(degrees := float(text)):
+            return degrees
+    raise ConfigError("current-direction", text, "degrees or 'random'")

@@ -49,8 +49,11 @@ def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None
     given: T = read() if default is None else read(default=default)
     try:
         return recheck(given)
-    except ConfigError as error:  # an episode's settings are flags of their own, without its name before them
-        raise ConfigError(error.field.removeprefix("episode."), error.value, error.remedy) from error
+    except ConfigError as error:
+        # An episode's settings are flags of their own, without its name before them; other flags have dashes.
+        setting = error.field.removeprefix("episode.")
+        name = setting if "." in setting else setting.replace("_", "-")
+        raise ConfigError(name, error.value, error.remedy) from error
 
 
 def _registry() -> ConstructorRegistry:

@@ -16,7 +16,8 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from auvdock.campaign.axes import AxisCfg, axis_kind, parse_axis
+from auvdock.campaign.axes import AxisCfg, axis_kind
+from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.campaign import CampaignSummary, run_campaign
 from auvdock.campaign.config import STATIONS, CampaignCfg
 from auvdock.campaign.executor import Executor, SerialExecutor

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from auvdock.assets import asset
-from auvdock.campaign.axes import AxisCfg, axis_kind, parse_axis
+from auvdock.campaign.axes import AxisCfg, axis_kind
+from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.config import CampaignCfg, campaign_from_plain
 from auvdock.campaign.files import load_campaign
 from auvdock.campaign.plan import Plan

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from auvdock.campaign.axes import AxisCfg, parse_axis
+from auvdock.campaign.axes import AxisCfg
+from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.config import STATIONS, CampaignCfg
 from auvdock.campaign.plan import Plan
 from auvdock.campaign.store import read_table

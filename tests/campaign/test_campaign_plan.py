@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auvdock.campaign.axes import AxisCfg, parse_axis
+from auvdock.campaign.axes import AxisCfg
+from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.config import CampaignCfg, campaign_from_plain
 from auvdock.campaign.files import load_campaign
 from auvdock.campaign.plan import Plan
