@@ -43,10 +43,12 @@ class GraphicsError(AuvdockError):
 
 @contextmanager
 def located(path: str) -> Generator[None]:
-    """Put `path` ("world.start.") before the field of every `ConfigError` that is raised inside."""
+    """Put `path` ("world.start.") before the field of every `ConfigError` that is raised inside and lacks it."""
     try:
         yield
     except ConfigError as error:
+        if error.field.startswith(path):
+            raise
         raise ConfigError(f"{path}{error.field}", error.value, error.remedy) from error
 
 
