@@ -12,6 +12,7 @@ from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.station import ConicalStationCfg, load_conical_station
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
+from auvdock.optics.water import WaterCfg
 from auvdock.sim.simulator import SimCfg
 
 __all__ = ["FIDELITIES", "HEADINGS", "LimitsCfg", "StartCfg", "WorldCfg", "check_rates", "rotating_world_cfg"]
@@ -50,12 +51,12 @@ class StartCfg:
     def __post_init__(self) -> None:
         """Refuse impossible starts."""
         if not 2.0 <= self.min_range_m <= self.max_range_m:
-            raise ConfigError("world.start.min_range_m", self.min_range_m, "2 m or more and at most max_range_m")
+            raise ConfigError("min_range_m", self.min_range_m, "2 m or more and at most max_range_m")
         if not 0.0 <= self.azimuth_deg <= 180.0:
-            raise ConfigError("world.start.azimuth_deg", self.azimuth_deg, "0 to 180 degrees")
+            raise ConfigError("azimuth_deg", self.azimuth_deg, "0 to 180 degrees")
         for name in ("lateral_m", "vertical_m", "heading_deg"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"world.start.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class LimitsCfg:
         """Refuse limits that end every episode at once."""
         for name in ("max_time_s", "collision_force_n"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"world.limits.{name}", getattr(self, name), "a number above 0")
+                raise ConfigError(name, getattr(self, name), "a number above 0")
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,8 @@ class WorldCfg:
 
     fidelity: str = "pixels"
     """"pixels" or "beacons"."""
-    water: str = "clear"
-    """Water preset: Jerlov "I" to "9C", "clear", "pool", "lake"."""
+    water: str | WaterCfg = "clear"
+    """Water preset (Jerlov "I" to "9C", "clear", "pool", "lake"), a TOML file of one's own, or that file's content."""
     attenuation_per_m: float | None = None
     """Beam attenuation c at 450 nm in 1/m in place of the preset's."""
     detection_model: str | None = None
@@ -108,9 +109,14 @@ class WorldCfg:
     def __post_init__(self) -> None:
         """Check that the rates divide and the names exist."""
         if self.station_heading not in HEADINGS:
-            raise ConfigError("world.station_heading", self.station_heading, f"one of {', '.join(HEADINGS)}")
+            raise ConfigError("station_heading", self.station_heading, f"one of {', '.join(HEADINGS)}")
         if not 0.0 <= self.frame_drop_share <= 0.95:
-            raise ConfigError("world.frame_drop_share", self.frame_drop_share, "a share of 0 to 0.95")
+            raise ConfigError("frame_drop_share", self.frame_drop_share, "a share of 0 to 0.95")
+        taken = {light.name for light in self.station.beacons} | {f"B{n}" for n in range(self.station.array_count)}
+        for light in self.extra_lights:
+            if light.name in taken:
+                raise ConfigError("extra_lights", light.name, "a name that no other light has, the station's included")
+            taken.add(light.name)
         if self.fidelity not in FIDELITIES:
             raise ConfigError("fidelity", self.fidelity, f"one of {', '.join(FIDELITIES)}")
         check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
@@ -122,9 +128,9 @@ def check_rates(physics_hz: float, control_hz: float, camera_hz: float) -> None:
     Raises:
         ConfigError: one that does not.
     """
-    for name, rate in (("world.control_hz", control_hz), ("world.camera.rate_hz", camera_hz)):
+    for name, rate in (("control_hz", control_hz), ("camera.rate_hz", camera_hz)):
         steps = physics_hz / rate if rate > 0.0 else 0.0
-        if steps < 1.0 or abs(steps - round(steps)) > 1e-9:
+        if not 1.0 <= steps < 1e6 or abs(steps - round(steps)) > 1e-9:
             raise ConfigError(name, rate, f"a rate that divides the physics rate of {physics_hz:g} Hz")
 
 

@@ -14,6 +14,7 @@ from auvdock.optics.lamp import LampCfg
 from auvdock.optics.landing_camera import landing_imaging
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.settings import ImagingCfg
+from auvdock.optics.water import WaterCfg
 from auvdock.sim.simulator import SimCfg
 
 __all__ = ["LandingStartCfg", "LandingWorldCfg"]
@@ -37,10 +38,10 @@ class LandingStartCfg:
     def __post_init__(self) -> None:
         """Refuse impossible starts."""
         if not 0.5 <= self.min_height_m <= self.max_height_m:
-            raise ConfigError("world.start.min_height_m", self.min_height_m, "0.5 m or more and at most max_height_m")
+            raise ConfigError("min_height_m", self.min_height_m, "0.5 m or more and at most max_height_m")
         for name in ("max_height_m", "lateral_m", "heading_deg"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"world.start.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,8 @@ class LandingWorldCfg:
 
     fidelity: str = "pixels"
     """"pixels" or "beacons"."""
-    water: str = "clear"
-    """Water preset: Jerlov "I" to "9C", "clear", "pool", "lake"."""
+    water: str | WaterCfg = "clear"
+    """Water preset (Jerlov "I" to "9C", "clear", "pool", "lake"), a TOML file of one's own, or that file's content."""
     attenuation_per_m: float | None = None
     """Beam attenuation c at 450 nm in 1/m in place of the preset's."""
     detection_model: str | None = None
@@ -76,13 +77,11 @@ class LandingWorldCfg:
         check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
         periods = self.control_hz / self.camera.rate_hz
         if abs(periods - round(periods)) > 1e-9:
-            raise ConfigError(
-                "world.control_hz", self.control_hz, f"a multiple of the camera's {self.camera.rate_hz:g} Hz"
-            )
+            raise ConfigError("control_hz", self.control_hz, f"a multiple of the camera's {self.camera.rate_hz:g} Hz")
         highest_m = self.start.max_height_m + self.station.guide.seat_height_m
         if highest_m > self.station.depth_m - 1.0:
             raise ConfigError(
-                "world.start.max_height_m",
+                "start.max_height_m",
                 self.start.max_height_m,
                 f"a start below the surface, the station lies {self.station.depth_m:g} m deep",
             )

@@ -12,6 +12,7 @@ from auvdock.core.arrays import Array, Image
 from auvdock.core.calibrated_camera import CalibratedCameraCfg, make_calibrated_camera
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Proprioception
+from auvdock.core.errors import located
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.marine import flip_vector
 from auvdock.core.strict import load_toml
@@ -68,16 +69,16 @@ class LandingWorld(VehicleWorld):
             cfg.faults,
             self.simulator.T_world_station,
         )
-        self.imager = LandingCamera(*optics, scene=self.simulator)
+        with located("world.faults."):
+            self.imager = LandingCamera(*optics, scene=self.simulator)
         self._sensor: LandingSensor | None = None
         if cfg.fidelity == "beacons":
             path = cfg.detection_model
-            self._sensor = LandingSensor(
-                *optics,
-                detector_name=detector,
-                tag_detector_name=tag_detector,
-                model=None if path is None else load_toml(DetectionModelCfg, Path(path)),
-            )
+            model = None if path is None else load_toml(DetectionModelCfg, Path(path))
+            with located("perception."):
+                self._sensor = LandingSensor(
+                    *optics, detector_name=detector, tag_detector_name=tag_detector, model=model
+                )
 
     def _draw_start(self, rng: np.random.Generator) -> Start:
         cfg = self.cfg

@@ -14,14 +14,14 @@ from auvdock.assets import asset_names
 from auvdock.core.arrays import Array, Image
 from auvdock.core.camera import Camera, CameraCfg, make_camera
 from auvdock.core.contracts import Detections, Frame, Proprioception, TagDetection
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, located
 from auvdock.core.marine import flip_vector
 from auvdock.core.stations import StationCfg
 from auvdock.core.strict import load_toml
-from auvdock.core.vehicle import MountCfg, VehicleCfg
+from auvdock.core.vehicle import MountCfg, VehicleCfg, load_vehicle
 from auvdock.envs.config import LimitsCfg
 from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
-from auvdock.optics.water import load_water, with_attenuation
+from auvdock.optics.water import WaterCfg, load_water, with_attenuation
 from auvdock.sim.ocean import CurrentCfg
 from auvdock.sim.simulator import SimCfg, Simulator
 from auvdock.sim.truth import Truth
@@ -67,8 +67,8 @@ class WorldSettings(Protocol):
     """What the configurations of all worlds have in common."""
 
     @property
-    def water(self) -> str:
-        """Water preset."""
+    def water(self) -> str | WaterCfg:
+        """Water preset, file, or water."""
         ...
 
     @property
@@ -116,11 +116,17 @@ class VehicleWorld(ABC):
         Raises:
             ConfigError: a preset that does not exist or a value that does not fit.
         """
-        self.simulator = Simulator(cfg.sim, station)
-        self.camera = make_camera(self.simulator.vehicle)
-        self.water = load_water(cfg.water)
-        if cfg.attenuation_per_m is not None:
-            self.water = with_attenuation(self.water, cfg.attenuation_per_m)
+        with located("world.station."):
+            _ = station.layout  # before whoever uses it: here it is known where its settings lie
+        with located("world.sim."):
+            vehicle = load_vehicle(cfg.sim.vehicle)
+        self.simulator = Simulator(cfg.sim, station, vehicle)
+        with located("world.camera."):
+            self.camera = make_camera(vehicle)
+        with located("world."):
+            self.water = load_water(cfg.water)
+            if cfg.attenuation_per_m is not None:
+                self.water = with_attenuation(self.water, cfg.attenuation_per_m)
         self._limits, self._hold_s, self._control_s = cfg.limits, station.latch.hold_s, 1.0 / cfg.control_hz
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)
         self._steps_per_frame = round(cfg.sim.physics_hz / self.camera.rate_hz)
@@ -226,7 +232,9 @@ def detection_model(path: str | None, detector: str) -> DetectionModelCfg:
         return load_toml(DetectionModelCfg, Path(path))
     if detector not in asset_names("detection"):
         remedy = "world.detection_model a file that `auvdock fit-detector` wrote for it, or fidelity 'pixels'"
-        raise ConfigError("detector", detector, f"{remedy}: the beacons fidelity knows only fitted detectors")
+        raise ConfigError(
+            "perception.detector", detector, f"{remedy}: the beacons fidelity knows only fitted detectors"
+        )
     return load_detection_model(detector)
 
 

@@ -52,7 +52,8 @@ class Plan:
         self.cfg = cfg
         self._grid = [axis for axis in cfg.axes if axis.is_grid]
         self._drawn = [axis for axis in cfg.axes if not axis.is_grid]
-        self._grids = [axis.grid for axis in self._grid]
+        self._kinds = {axis.name: cfg.kind(axis) for axis in cfg.axes}
+        self._grids = [tuple(axis.typed(value, self._kinds[axis.name]) for value in axis.grid) for axis in self._grid]
         self.cells = math.prod(len(values) for values in self._grids)
         self._design = self._draw_design()
 
@@ -79,7 +80,7 @@ class Plan:
             unit = np.random.default_rng(sequence).random(len(self._drawn))
             unit = unit if self._design is None else self._design[episode]
             for axis, probability in zip(self._drawn, unit, strict=True):
-                point[axis.name] = axis.quantile(float(probability))
+                point[axis.name] = axis.drawn(float(probability), self._kinds[axis.name])
         return EpisodeSpec(episode, seed, {axis.name: point[axis.name] for axis in self.cfg.axes})
 
     def config(self, spec: EpisodeSpec) -> AnyEpisodeCfg:
@@ -87,7 +88,7 @@ class Plan:
         level = spec.point.get("level", self.cfg.level)
         cfg = self.cfg.base(int(level))
         for axis in self.cfg.axes:
-            cfg = cfg.override(axis.changes(spec.point[axis.name]))
+            cfg = cfg.override(self.cfg.changes(axis, spec.point[axis.name]))
         return cfg
 
     def _draw_design(self) -> Array | None:

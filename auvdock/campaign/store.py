@@ -214,7 +214,7 @@ def _without(rows: Iterable[Row], episodes: set[int]) -> list[Row]:
 
 
 def _check_same(there: CampaignCfg, wanted: CampaignCfg) -> None:
-    for name in ("station", "seed", "axes", "sampling", "level", "episode"):
+    for name in ("station", "seed", "axes", "sampling", "level", "episode", "waters"):
         if getattr(there, name) != getattr(wanted, name):
             raise ConfigError(
                 name, getattr(wanted, name), f"{getattr(there, name)!r} as the campaign has it, to resume"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from importlib import import_module
 
 from auvdock.cli.notices import told_once, unusable_gl
@@ -79,6 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         module, function = COMMANDS[command][0].split(":")
         run: Callable[[Sequence[str], str], int] = getattr(import_module(module), function)
         relax_collector()
+        _find_modules_here()
         from auvdock.core.compiled import compiling  # half a second, not for a usage message
 
         with told_once(), nullcontext() if "--json" in words else compiling(_tell_of_compiling):
@@ -94,6 +96,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 141
+
+
+def _find_modules_here() -> None:
+    """Let detectors and pilots of one's own be found in the current folder, in worker processes too.
+
+    After everything else: a file there must not stand in for a module of the same name that something here needs.
+    """
+    with suppress(OSError):  # the folder may be gone
+        if (here := os.getcwd()) not in sys.path:
+            sys.path.append(here)
 
 
 def _tell_of_compiling() -> None:

@@ -29,11 +29,11 @@ class TagCfg:
     def __post_init__(self) -> None:
         """Refuse what the family does not have."""
         if not 0 <= self.tag_id <= 586:
-            raise ConfigError("station.tag.tag_id", self.tag_id, "a number of 0 to 586, family 36h11 has 587 tags")
+            raise ConfigError("tag_id", self.tag_id, "a number of 0 to 586, family 36h11 has 587 tags")
         if not 0.02 <= self.size_m <= 2.0:
-            raise ConfigError("station.tag.size_m", self.size_m, "an edge of 0.02 to 2 m")
+            raise ConfigError("size_m", self.size_m, "an edge of 0.02 to 2 m")
         if not 0.0 < self.reflectance <= 1.0:
-            raise ConfigError("station.tag.reflectance", self.reflectance, "a fraction above 0 and up to 1")
+            raise ConfigError("reflectance", self.reflectance, "a fraction above 0 and up to 1")
 
 
 @dataclass(frozen=True)
@@ -59,15 +59,13 @@ class GuideCfg:
         """Refuse what is no guide."""
         for name in ("thickness_m", "mouth_half_width_m", "seat_radius_m", "seat_height_m"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"station.guide.{name}", getattr(self, name), "a length above 0 m")
+                raise ConfigError(name, getattr(self, name), "a length above 0 m")
         if not 15.0 <= self.opening_half_angle_deg <= 75.0:
-            raise ConfigError(
-                "station.guide.opening_half_angle_deg", self.opening_half_angle_deg, "an angle of 15 to 75 degrees"
-            )
+            raise ConfigError("opening_half_angle_deg", self.opening_half_angle_deg, "an angle of 15 to 75 degrees")
         if self.mouth_half_width_m <= self.seat_radius_m:
-            raise ConfigError("station.guide.mouth_half_width_m", self.mouth_half_width_m, "more than seat_radius_m")
+            raise ConfigError("mouth_half_width_m", self.mouth_half_width_m, "more than seat_radius_m")
         if self.friction < 0.0:
-            raise ConfigError("station.guide.friction", self.friction, "0 or more")
+            raise ConfigError("friction", self.friction, "0 or more")
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ class LandingStationCfg:
         """Refuse what is no platform."""
         for name in ("depth_m", "length_m", "width_m", "height_m"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(f"station.{name}", getattr(self, name), "a length above 0 m")
+                raise ConfigError(name, getattr(self, name), "a length above 0 m")
 
     @property
     def floor_below_m(self) -> float:

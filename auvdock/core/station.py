@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from auvdock.assets import asset
 from auvdock.core.beacons import BeaconCfg, BeaconLayout, ring_layout
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, located
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.strict import load_toml
 
@@ -32,11 +32,11 @@ class FunnelCfg:
         """Refuse what is not a funnel."""
         for name in ("mouth_radius_m", "length_m", "tube_radius_m", "tube_length_m"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"station.funnel.{name}", getattr(self, name), "a length above 0 m")
+                raise ConfigError(name, getattr(self, name), "a length above 0 m")
         if self.tube_radius_m >= self.mouth_radius_m:
-            raise ConfigError("station.funnel.tube_radius_m", self.tube_radius_m, "less than mouth_radius_m")
+            raise ConfigError("tube_radius_m", self.tube_radius_m, "less than mouth_radius_m")
         if self.friction < 0.0:
-            raise ConfigError("station.funnel.friction", self.friction, "0 or more")
+            raise ConfigError("friction", self.friction, "0 or more")
 
 
 @dataclass(frozen=True)
@@ -87,17 +87,18 @@ class ConicalStationCfg:
 
 def conical_layout(cfg: ConicalStationCfg) -> BeaconLayout:
     """The lights of a conical station: `array_count` on the mouth's rim, then those listed."""
-    ring = (
-        ring_layout(
-            cfg.array_count,
-            cfg.funnel.mouth_radius_m,
-            inward_tilt_deg=cfg.array_tilt_deg,
-            beam_angle_deg=cfg.array_beam_angle_deg,
-            power_w=cfg.array_power_w,
+    with located("array_"):  # a lamp's `power_w` is the station's `array_power_w`
+        ring = (
+            ring_layout(
+                cfg.array_count,
+                cfg.funnel.mouth_radius_m,
+                inward_tilt_deg=cfg.array_tilt_deg,
+                beam_angle_deg=cfg.array_beam_angle_deg,
+                power_w=cfg.array_power_w,
+            )
+            if cfg.array_count > 0
+            else ()
         )
-        if cfg.array_count > 0
-        else ()
-    )
     return BeaconLayout(ring + cfg.beacons)
 
 

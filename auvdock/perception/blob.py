@@ -47,11 +47,11 @@ class BlobCfg:
     def __post_init__(self) -> None:
         """Refuse thresholds without meaning."""
         if not 0.0 <= self.min_threshold < self.max_threshold <= 255.0:
-            raise ConfigError("detector.min_threshold", self.min_threshold, "0 <= min_threshold < max_threshold <= 255")
+            raise ConfigError("min_threshold", self.min_threshold, "0 <= min_threshold < max_threshold <= 255")
         if not self.threshold_step >= 1.0:
-            raise ConfigError("detector.threshold_step", self.threshold_step, "1 or more")
+            raise ConfigError("threshold_step", self.threshold_step, "1 or more")
         if not 0.0 < self.min_area_px < self.max_area_px:
-            raise ConfigError("detector.min_area_px", self.min_area_px, "0 < min_area_px < max_area_px")
+            raise ConfigError("min_area_px", self.min_area_px, "0 < min_area_px < max_area_px")
 
 
 class BlobDetector:

@@ -61,13 +61,13 @@ class TrackerCfg:
         """Refuse what no filter can use."""
         for name in ("pixel_sigma_px", "acceleration_px_s2", "initial_speed_px_s", "gate_sigmas"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"tracker.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
         for name in ("confirm_hits", "window_frames"):
             if getattr(self, name) < 1:
-                raise ConfigError(f"tracker.{name}", getattr(self, name), "1 or more")
+                raise ConfigError(name, getattr(self, name), "1 or more")
         for name in ("max_predicted_frames", "max_tentative_frames"):
             if getattr(self, name) < 0:
-                raise ConfigError(f"tracker.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 class LightTracker:

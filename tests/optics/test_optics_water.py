@@ -76,7 +76,7 @@ def test_attenuation_of_a_water_without_scattering():
 def test_impossible_attenuation_is_refused(c_450):
     with pytest.raises(ConfigError) as caught:
         with_attenuation(load_water("pool"), c_450)
-    assert caught.value.field == "water.attenuation"
+    assert caught.value.field == "attenuation_per_m"
     assert "0.05" in caught.value.remedy
 
 
