@@ -70,8 +70,8 @@ on an entry outside its limits (`terminal`). Truncated after `WorldCfg.limits.ma
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -79,8 +79,10 @@ from gymnasium import spaces
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import AzimuthFix, Percept
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
-from auvdock.envs.config import WorldCfg
-from auvdock.envs.vehicle_env import BOUND, OBSERVATIONS, VehicleEnv, box, check_options
+from auvdock.envs.config import StartCfg, WorldCfg
+from auvdock.envs.options import OBSERVATIONS, check_options, reward_settings, world_settings
+from auvdock.envs.reward import RewardCfg
+from auvdock.envs.vehicle_env import BOUND, VehicleEnv, box
 from auvdock.envs.world import DockingWorld, Sensed
 from auvdock.perception.detectors import make_station_detector
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
@@ -92,14 +94,18 @@ __all__ = ["OBSERVATIONS", "DockingEnv"]
 class DockingEnv(VehicleEnv):
     """`auvdock/ConicalDocking-v0`; see the module's docstring for the tables."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 30}
+    default_cfg = staticmethod(WorldCfg)
+    """Makes the world where no `cfg` is given."""
 
     def __init__(
         self,
         cfg: WorldCfg | None = None,
         *,
         observation: str = "state",
-        fidelity: str = "beacons",
+        fidelity: str | None = None,
+        start: StartCfg | Mapping[str, Any] | None = None,
+        reward: RewardCfg | Mapping[str, Any] | None = None,
+        time_limit_s: float | None = None,
         perception: PerceptionCfg | None = None,
         render_mode: str | None = None,
         render_camera: str = "chase",
@@ -109,8 +115,8 @@ class DockingEnv(VehicleEnv):
         Raises:
             ConfigError: an option that does not exist or does not fit the others.
         """
-        check_options(observation, fidelity, render_mode, render_camera, ("chase", "bow"))
-        self.cfg = dataclasses.replace(cfg or WorldCfg(), fidelity=fidelity)
+        self.cfg = world_settings(self.default_cfg(), cfg, observation, fidelity, start, time_limit_s)
+        check_options(observation, self.cfg.fidelity, render_mode, render_camera, ("chase", "bow"))
         perception = perception or PerceptionCfg()
         self._world = DockingWorld(self.cfg, perception.detector)
         self._detector = make_station_detector(perception.detector, self.cfg.station)
@@ -123,7 +129,7 @@ class DockingEnv(VehicleEnv):
         )
         self._percept: Percept | None = None
         self._fix: AzimuthFix | None = None
-        super().__init__(self._world, observation, render_mode, render_camera)
+        super().__init__(self._world, observation, self.cfg, reward_settings(reward), render_mode, render_camera)
 
     @property
     def world(self) -> DockingWorld:

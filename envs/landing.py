@@ -74,17 +74,19 @@ always has `is_success` (bool) and `failure_reason` (str or None).
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
 from auvdock.core.arrays import Array
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
-from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.landing_world import LandingWorld
-from auvdock.envs.vehicle_env import VehicleEnv, box, check_options
+from auvdock.envs.options import check_options, reward_settings, world_settings
+from auvdock.envs.reward import RewardCfg
+from auvdock.envs.vehicle_env import VehicleEnv, box
 from auvdock.envs.vehicle_world import Sensed
 from auvdock.perception.detectors import make_detector
 from auvdock.perception.landing.config import LandingPerceptionCfg
@@ -100,14 +102,15 @@ _LEVELS = {"none": 0.0, "lights": 1.0, "tag": 2.0, "fused": 3.0}
 class LandingEnv(VehicleEnv):
     """`auvdock/LandingDocking-v0`; see the module's docstring for the tables."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 20}
-
     def __init__(
         self,
         cfg: LandingWorldCfg | None = None,
         *,
         observation: str = "state",
-        fidelity: str = "beacons",
+        fidelity: str | None = None,
+        start: LandingStartCfg | Mapping[str, Any] | None = None,
+        reward: RewardCfg | Mapping[str, Any] | None = None,
+        time_limit_s: float | None = None,
         perception: LandingPerceptionCfg | None = None,
         render_mode: str | None = None,
         render_camera: str = "chase",
@@ -117,8 +120,8 @@ class LandingEnv(VehicleEnv):
         Raises:
             ConfigError: an option that does not exist or does not fit the others.
         """
-        check_options(observation, fidelity, render_mode, render_camera, ("chase", "belly"))
-        self.cfg = dataclasses.replace(cfg or LandingWorldCfg(), fidelity=fidelity)
+        self.cfg = world_settings(LandingWorldCfg(), cfg, observation, fidelity, start, time_limit_s)
+        check_options(observation, self.cfg.fidelity, render_mode, render_camera, ("chase", "belly"))
         perception = perception or LandingPerceptionCfg()
         self._world = LandingWorld(self.cfg, perception.detector, perception.tag_detector)
         self._detector = make_detector(perception.detector)
@@ -126,7 +129,7 @@ class LandingEnv(VehicleEnv):
         self._perception = LandingPerception(perception, self._world.camera, self.cfg.station)
         self._percept: LandingPercept | None = None
         self._seat = np.append(self._world.simulator.vehicle.seat_body_m, 1.0)
-        super().__init__(self._world, observation, render_mode, render_camera)
+        super().__init__(self._world, observation, self.cfg, reward_settings(reward), render_mode, render_camera)
 
     @property
     def world(self) -> LandingWorld:

@@ -70,36 +70,13 @@ As in `auvdock/ConicalDocking-v0`, with `WorldCfg.limits.max_time_s` 600 s.
 
 from __future__ import annotations
 
-from auvdock.envs.config import WorldCfg, rotating_world_cfg
+from auvdock.envs.config import rotating_world_cfg
 from auvdock.envs.docking import DockingEnv
-from auvdock.perception.pipeline import PerceptionCfg
 
 __all__ = ["RotatingDockingEnv"]
 
 
 class RotatingDockingEnv(DockingEnv):
-    """`auvdock/RotatingBeaconDocking-v0`; see the module's docstring for the tables."""
+    """`auvdock/RotatingBeaconDocking-v0`; see the module's docstring for the tables, `DockingEnv` for the arguments."""
 
-    def __init__(
-        self,
-        cfg: WorldCfg | None = None,
-        *,
-        observation: str = "state",
-        fidelity: str = "beacons",
-        perception: PerceptionCfg | None = None,
-        render_mode: str | None = None,
-        render_camera: str = "chase",
-    ) -> None:
-        """Build the environment; no renderer is made before an image is asked for.
-
-        Raises:
-            ConfigError: an option that does not exist or does not fit the others.
-        """
-        super().__init__(
-            cfg or rotating_world_cfg(),
-            observation=observation,
-            fidelity=fidelity,
-            perception=perception,
-            render_mode=render_mode,
-            render_camera=render_camera,
-        )
+    default_cfg = staticmethod(rotating_world_cfg)
