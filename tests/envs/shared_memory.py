@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-_LEAVES = (str, bytes, int, float, complex, bool, type(None), type, np.generic, np.dtype)
-_LEAVES += (types.FunctionType, types.BuiltinFunctionType, types.ModuleType)
+_NAMED = (type, types.FunctionType, types.BuiltinFunctionType, types.ModuleType)
+_LEAVES = (str, bytes, int, float, complex, bool, type(None), np.generic, np.dtype, *_NAMED)
 
 
 def parts(item: Any) -> Iterator[tuple[str, Any]]:
