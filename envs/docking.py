@@ -50,19 +50,29 @@ All boxes are float64 and bounded by ±1000, which nothing reaches before the ep
 
 ## Reward
 Progress of the nose towards the latch in metres, less 0.001 times the thruster work in joules, plus 100 on success,
-less 50 on collision or divergence.
+less 50 on collision or divergence. `auvdock.envs.reward.RewardCfg` has these numbers, and a price of time, as settings.
 
 ## Starting state
 Uniform within `WorldCfg.start`: 15 to 30 m in front of the mouth, ±3 m sideways, ±1.5 m in depth, ±30° of heading.
 
 ## Episode end
 Terminated by success, a collision harder than `WorldCfg.limits.collision_force_n`, divergence, or a latch that closed
-on an entry outside its limits (`terminal`). Truncated after `WorldCfg.limits.max_time_s`. `info` always has
-`is_success` (bool) and `failure_reason` (str or None).
+on an entry outside its limits (`terminal`). Truncated after `WorldCfg.limits.max_time_s`, 240 s. `info`
+always has `is_success` (bool) and `failure_reason` (str or None). A step after the end, or before the first reset,
+raises `gymnasium.error.ResetNeeded`.
 
 ## Arguments
-`cfg` (`WorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`
-(`PerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"), `render_camera` ("chase" or "bow").
+`cfg` (`WorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"; by default the `cfg`'s,
+without a `cfg` "pixels" for images and else "beacons"), `start` (`StartCfg`, or a mapping of the fields to change, in
+place of the `cfg`'s), `reward` (`RewardCfg`, or a mapping of the fields to change), `time_limit_s` (in place of
+`cfg.limits.max_time_s`), `perception` (`PerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"), `render_camera`
+("chase" or "bow").
+
+`gymnasium.make` itself takes `max_episode_steps`, a number of control periods: its own wrapper then truncates, and
+`failure_reason` stays None. Any other argument that cannot be used raises `ConfigError` with its name.
+
+For training, something like `gymnasium.make("auvdock/ConicalDocking-v0", start={"min_range_m": 3, "max_range_m": 5},
+time_limit_s=30)`, wrapped in `auvdock.envs.wrappers.SetPointAction`: the default's 240 s are 7,200 steps.
 
 ## Version history
 - v0: first version.

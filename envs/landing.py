@@ -53,7 +53,7 @@ All boxes are float64 and bounded by ±1000, which nothing reaches before the ep
 
 ## Reward
 Progress of the seat towards its place in metres, less 0.001 times the thruster work in joules, plus 100 on success,
-less 50 on collision or divergence.
+less 50 on collision or divergence. `auvdock.envs.reward.RewardCfg` has these numbers, and a price of time, as settings.
 
 ## Starting state
 Uniform within `LandingWorldCfg.start`: 3 to 6 m above the seat's place, ±1.5 m along and across, ±45° of heading, at
@@ -61,12 +61,19 @@ rest in the water.
 
 ## Episode end
 Terminated by success, a collision harder than `LandingWorldCfg.limits.collision_force_n`, divergence, or an arm that
-closed after a touchdown that was too hard (`terminal`). Truncated after `LandingWorldCfg.limits.max_time_s`. `info`
-always has `is_success` (bool) and `failure_reason` (str or None).
+closed after a touchdown that was too hard (`terminal`). Truncated after `LandingWorldCfg.limits.max_time_s`,
+240 s. `info` always has `is_success` (bool) and `failure_reason` (str or None). A step after the end, or before the
+first reset, raises `gymnasium.error.ResetNeeded`.
 
 ## Arguments
-`cfg` (`LandingWorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`
-(`LandingPerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"), `render_camera` ("chase" or "belly").
+`cfg` (`LandingWorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"; by default the
+`cfg`'s, without a `cfg` "pixels" for images and else "beacons"), `start` (`LandingStartCfg`, or a mapping of the fields
+to change, in place of the `cfg`'s), `reward` (`RewardCfg`, or a mapping of the fields to change), `time_limit_s` (in
+place of `cfg.limits.max_time_s`), `perception` (`LandingPerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"),
+`render_camera` ("chase" or "belly").
+
+`gymnasium.make` itself takes `max_episode_steps`, a number of control periods: its own wrapper then truncates, and
+`failure_reason` stays None. Any other argument that cannot be used raises `ConfigError` with its name.
 
 ## Version history
 - v0: first version.
