@@ -9,8 +9,8 @@ from auvdock.core.errors import ConfigError
 
 __all__ = ["RewardCfg"]
 
-_FAILURES = ("diverged", "collision")
-"""Endings that cost `RewardCfg.failure`."""
+_FREE_OF_CHARGE = ("timeout", "terminal")
+"""Endings that do not cost `RewardCfg.failure`: nothing went wrong but that the vehicle did not dock."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class RewardCfg:
     success: float = 100.0
     """For docking."""
     failure: float = 50.0
-    """Taken off for a collision or a divergence."""
+    """Taken off where an episode ends early without success, a latch that closed on a bad entry apart."""
 
     def __post_init__(self) -> None:
         """All are finite; a cost below 0 would be a prize."""
@@ -51,6 +51,6 @@ class RewardCfg:
         reward = self.progress_per_m * progress_m - self.energy_per_j * work_j - self.time_per_s * period_s
         if success:
             reward += self.success
-        elif end in _FAILURES:
+        elif end is not None and end not in _FREE_OF_CHARGE:
             reward -= self.failure
         return reward

@@ -26,7 +26,7 @@ LANDING = "auvdock/LandingDocking-v0"
 STARTS: dict[str, dict[str, float]] = {
     CONICAL: {"min_range_m": 3, "max_range_m": 5.0},
     ROTATING: {"min_range_m": 5, "max_range_m": 6.0, "azimuth_deg": 20},
-    LANDING: {"min_height_m": 1, "max_height_m": 2.0},
+    LANDING: {"min_height_m": 2, "max_height_m": 3.0},
 }
 KINDS: dict[str, Any] = {CONICAL: DockingEnv, ROTATING: RotatingDockingEnv, LANDING: LandingEnv}
 
@@ -112,7 +112,8 @@ def test_the_reward_is_what_its_settings_say() -> None:
     assert cfg.of(0.1, 0.2, 4.0, success=False, end=None) == pytest.approx(step)
     assert cfg.of(0.1, 0.2, 4.0, success=True, end=None) == pytest.approx(step + 10.0)
     assert cfg.of(0.1, 0.2, 4.0, success=False, end="collision") == pytest.approx(step - 20.0)
-    assert cfg.of(0.1, 0.2, 4.0, success=False, end="timeout") == pytest.approx(step)
+    for end in ("timeout", "terminal"):
+        assert cfg.of(0.1, 0.2, 4.0, success=False, end=end) == pytest.approx(step)
 
 
 @pytest.mark.parametrize("name", KINDS)
