@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from auvdock.core.arrays import Array, Image
+from auvdock.core.arrays import Array
 from auvdock.core.calibrated_camera import CalibratedCameraCfg, make_calibrated_camera
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Proprioception
@@ -21,6 +21,7 @@ from auvdock.core.vehicle import VehicleCfg
 from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.vehicle_world import Sensed, Start, VehicleWorld
 from auvdock.optics.detection_model import DetectionModelCfg
+from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.landing_camera import LandingCamera
 from auvdock.optics.landing_sensing import LandingSensor
 from auvdock.sim.truth import Truth
@@ -98,10 +99,8 @@ class LandingWorld(VehicleWorld):
             return Sensed(proprioception, None, detections, tags)
         return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s), None)
 
-    def picture(self) -> Image:
-        """(H, W, 3) uint8 RGB of what the camera sees now."""
-        truth = self.truth
-        return self.imager.capture(truth.T_world_body, truth.time_s).image
+    def _rendered_camera(self) -> UnderwaterCamera:
+        return self.imager
 
     def close(self) -> None:
         """Release the renderer."""

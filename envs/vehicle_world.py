@@ -21,6 +21,7 @@ from auvdock.core.strict import load_toml
 from auvdock.core.vehicle import MountCfg, VehicleCfg, load_vehicle
 from auvdock.envs.config import LimitsCfg
 from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
+from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.water import WaterCfg, load_water, with_attenuation
 from auvdock.sim.ocean import CurrentCfg
 from auvdock.sim.simulator import SimCfg, Simulator
@@ -65,6 +66,11 @@ class Start:
 
 class WorldSettings(Protocol):
     """What the configurations of all worlds have in common."""
+
+    @property
+    def fidelity(self) -> str:
+        """One of `auvdock.envs.config.FIDELITIES`."""
+        ...
 
     @property
     def water(self) -> str | WaterCfg:
@@ -134,6 +140,9 @@ class VehicleWorld(ABC):
         self._last_frame_step = -1
         self._latched_at_s: float | None = None
         self._truth: Truth | None = None
+        self._renders_apart = cfg.fidelity == "beacons"
+        self._seed, self._pictured = 0, False
+        self._camera_rng: np.random.Generator | None = None
 
     @abstractmethod
     def _draw_start(self, rng: np.random.Generator) -> Start:
@@ -151,8 +160,23 @@ class VehicleWorld(ABC):
         """Take a frame, or what stands in for it."""
 
     @abstractmethod
+    def _rendered_camera(self) -> UnderwaterCamera:
+        """The camera that the pilot looks through, as one that renders."""
+
     def picture(self) -> Image:
-        """(H, W, 3) uint8 RGB of what the pilot's camera sees now, in whatever fidelity."""
+        """(H, W, 3) uint8 RGB of what the pilot's camera sees now, in whatever fidelity.
+
+        In `beacons` a camera that the episode does without takes it, under the same lights: which pictures an episode
+        shows follows from its seed and from when they were asked for, and the episode does not depend on them.
+        """
+        camera = self._rendered_camera()
+        if not self._renders_apart:
+            self._start_camera()
+        elif not self._pictured:
+            self._pictured = True
+            camera.reset(_streams(self._seed)[2])
+        truth = self.truth
+        return camera.capture(truth.T_world_body, truth.time_s).image
 
     @abstractmethod
     def close(self) -> None:
@@ -160,8 +184,7 @@ class VehicleWorld(ABC):
 
     def reset(self, seed: int) -> None:
         """Start a new episode; the seed alone decides everything that is drawn in it."""
-        children = np.random.SeedSequence(seed).spawn(4)
-        start, physics, camera, link = (np.random.default_rng(child) for child in children)
+        start, physics, camera, link = _streams(seed)
         drawn = self._draw_start(start)
         self.simulator.reset(
             drawn.position_m,
@@ -170,12 +193,13 @@ class VehicleWorld(ABC):
             current=drawn.current,
             compass_datum_rad=drawn.compass_datum_rad,
         )
-        self._reset_camera(camera)
+        self._camera_rng = camera
         self._reset_link(link)
         self._step_count = 0
         self._last_frame_step = -self._steps_per_frame
         self._latched_at_s = None
         self._truth = None
+        self._seed, self._pictured = seed, False
 
     def step(self, values: Array) -> None:
         """Apply actuator commands (n,) in [-1, 1] for one control period."""
@@ -191,7 +215,14 @@ class VehicleWorld(ABC):
         if self._step_count - self._last_frame_step < self._steps_per_frame:
             return Sensed(proprioception, None, None)
         self._last_frame_step = self._step_count
+        self._start_camera()
         return self._look(self.truth, proprioception)
+
+    def _start_camera(self) -> None:
+        """Start the episode's optics when the first frame is due: an episode in which nobody looks does without."""
+        if self._camera_rng is not None:
+            self._reset_camera(self._camera_rng)
+            self._camera_rng = None
 
     @property
     def truth(self) -> Truth:
@@ -220,6 +251,11 @@ class VehicleWorld(ABC):
     def is_success(self) -> bool:
         """Latched, held, and within the limits of the station's latch."""
         return self.truth.docked
+
+
+def _streams(seed: int) -> list[np.random.Generator]:
+    """Generators of an episode: start, physics and sensors, camera, clock and lost frames."""
+    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
 
 
 def detection_model(path: str | None, detector: str) -> DetectionModelCfg:

@@ -72,6 +72,10 @@ class BlobDetector:
         params.filterByInertia = False
         self._detector = cv2.SimpleBlobDetector.create(params)
 
+    def __reduce__(self) -> tuple[type[BlobDetector], tuple[BlobCfg]]:
+        """OpenCV's part cannot be copied or pickled: it is made anew."""
+        return BlobDetector, (self._cfg,)
+
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> Detections:
         """Detect in the whole frame; with regions, keep what lies in them.
 
