@@ -33,9 +33,9 @@ class AllocationCfg:
     def __post_init__(self) -> None:
         """The weight divides; the preload leaves room to work."""
         if not self.fin_weight > 0.0:
-            raise ConfigError("control.allocation.fin_weight", self.fin_weight, "a weight above 0")
+            raise ConfigError("fin_weight", self.fin_weight, "a weight above 0")
         if not 0.0 <= self.preload <= 0.5:
-            raise ConfigError("control.allocation.preload", self.preload, "a command of 0 to 0.5")
+            raise ConfigError("preload", self.preload, "a command of 0 to 0.5")
 
 
 class ThrustAllocator:

@@ -13,7 +13,7 @@ from auvdock.controllers.gains import AutopilotGains, DesignCfg, design_gains
 from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, located
 from auvdock.core.vehicle import VehicleCfg
 
 __all__ = ["Autopilot", "AutopilotCfg", "AutopilotSetpoint", "AutopilotState"]
@@ -58,10 +58,10 @@ class AutopilotCfg:
             "current_time_constant_s",
         ):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"control.autopilot.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
         for name in ("force_share", "moment_share"):
             if getattr(self, name) > 1.0:
-                raise ConfigError(f"control.autopilot.{name}", getattr(self, name), "a share of at most 1")
+                raise ConfigError(name, getattr(self, name), "a share of at most 1")
 
 
 class AutopilotSetpoint(NamedTuple):
@@ -134,7 +134,8 @@ class Autopilot:
             cfg: limits and loop design.
             dt_s: control period.
         """
-        self.gains: AutopilotGains = design_gains(vehicle, cfg.design, dt_s)
+        with located("autopilot.design."):
+            self.gains: AutopilotGains = design_gains(vehicle, cfg.design, dt_s)
         self._max_heave_m_s = cfg.max_heave_m_s
         self._dt_s = dt_s
         self._smoothing = 1.0 - math.exp(-dt_s / cfg.current_time_constant_s)

@@ -60,12 +60,10 @@ class DesignCfg:
         for axis in ("surge", "sway", "heave", "roll", "pitch", "heading", "depth"):
             name = f"{axis}_crossover_rad_s"
             if not 0.01 <= getattr(self, name) <= 10.0:
-                raise ConfigError(f"control.design.{name}", getattr(self, name), "a crossover of 0.01 to 10 rad/s")
+                raise ConfigError(name, getattr(self, name), "a crossover of 0.01 to 10 rad/s")
         for name in ("velocity_margin_deg", "attitude_margin_deg"):
             if not self.min_phase_margin_deg <= getattr(self, name) < 90.0:
-                raise ConfigError(
-                    f"control.design.{name}", getattr(self, name), "a phase margin of min_phase_margin_deg up to 90"
-                )
+                raise ConfigError(name, getattr(self, name), "a phase margin of min_phase_margin_deg up to 90")
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,7 @@ def _checked(axis: str, gains: PidGains, transfer: Any, cfg: DesignCfg) -> LoopD
     gain_db, phase_deg, crossover = loop_margins(_controller(gains) * transfer)
     if gain_db < cfg.min_gain_margin_db or phase_deg < cfg.min_phase_margin_deg:
         raise ConfigError(
-            f"control.design.{axis}_crossover_rad_s",
+            f"{axis}_crossover_rad_s",
             getattr(cfg, f"{axis}_crossover_rad_s"),
             f"a slower loop: margins are {gain_db:.1f} dB and {phase_deg:.0f} deg",
         )
@@ -160,9 +158,7 @@ def _velocity_loop(plant: AxisPlant, delay_s: float, crossover: float, cfg: Desi
     transfer = plant_transfer(plant, delay_s)
     size, phase = _controller_at_crossover(transfer, crossover, cfg.velocity_margin_deg)
     if phase >= 0.0:
-        raise ConfigError(
-            f"control.design.{plant.axis}_crossover_rad_s", crossover, "a slower loop: lag and delay eat the margin"
-        )
+        raise ConfigError(f"{plant.axis}_crossover_rad_s", crossover, "a slower loop: lag and delay eat the margin")
     # Strong damping would let the integral do most of the work; a cap keeps the loop from creeping.
     phase = max(phase, math.radians(-30.0))
     gains = PidGains(kp=size * math.cos(phase), ki=-crossover * size * math.sin(phase), kd=0.0)
@@ -179,9 +175,7 @@ def _attitude_loop(plant: AxisPlant, delay_s: float, crossover: float, cfg: Desi
     size, phase = _controller_at_crossover(transfer, crossover, cfg.attitude_margin_deg)
     phase = max(phase, -math.atan(cfg.integral_ratio))
     if phase > math.radians(85.0):
-        raise ConfigError(
-            f"control.design.{plant.axis}_crossover_rad_s", crossover, "a crossover that derivative action can support"
-        )
+        raise ConfigError(f"{plant.axis}_crossover_rad_s", crossover, "a crossover that derivative action can support")
     kp = size * math.cos(phase)
     ki = cfg.integral_ratio * crossover * kp
     kd = max(0.0, (size * math.sin(phase) + ki / crossover) / crossover)
@@ -198,7 +192,7 @@ def cascade_design(inner: LoopDesign, plant: AxisPlant, delay_s: float, cfg: Des
     gain = 1.0 / abs(complex(transfer(1j * crossover)))
     gain_db, phase_deg, achieved = loop_margins(gain * transfer)
     if gain_db < cfg.min_gain_margin_db or phase_deg < cfg.min_phase_margin_deg:
-        raise ConfigError("control.design.depth_crossover_rad_s", crossover, "a loop slower than the heave loop")
+        raise ConfigError("depth_crossover_rad_s", crossover, "a loop slower than the heave loop")
     return LoopDesign(PidGains(kp=gain, ki=0.0, kd=0.0), achieved, gain_db, phase_deg)
 
 

@@ -99,9 +99,9 @@ class GuidanceCfg:
         for name, value in vars(self).items():
             if name == "integral_gain":
                 if value < 0.0:
-                    raise ConfigError(f"control.guidance.{name}", value, "a gain of 0 or more")
+                    raise ConfigError(name, value, "a gain of 0 or more")
             elif not value > 0.0:
-                raise ConfigError(f"control.guidance.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
 
 
 def axis_law(cfg: GuidanceCfg, modes: ModeCfg, funnel_length_m: float, reach_m_s: float, dt_s: float) -> Array:

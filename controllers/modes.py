@@ -108,10 +108,10 @@ class ModeCfg:
         """All are positive; the gate lies between mouth and standoff."""
         for name, value in vars(self).items():
             if not value > 0:
-                raise ConfigError(f"control.modes.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
         if not self.mouth_m < self.gate_distance_m <= self.commit_distance_m < self.standoff_m:
             raise ConfigError(
-                "control.modes.gate_distance_m",
+                "gate_distance_m",
                 self.gate_distance_m,
                 "mouth_m < gate_distance_m <= commit_distance_m < standoff_m",
             )

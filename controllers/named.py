@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 from auvdock.controllers.pilot import Pilot
 from auvdock.core.camera import Camera
 from auvdock.core.errors import ConfigError
+from auvdock.core.named import find_named
 from auvdock.core.stations import StationCfg
 from auvdock.core.vehicle import VehicleCfg
 
@@ -29,17 +29,9 @@ def find_pilot(name: str) -> PilotFactory | None:
     """
     if name == OWN:
         return None
-    module_name, colon, attribute = name.partition(":")
-    if not colon:
+    if ":" not in name:
         raise ConfigError("controller", name, f"{OWN}, or a pilot of yours as package.module:Name")
-    try:
-        module = importlib.import_module(module_name)
-    except (ImportError, ValueError) as error:
-        raise ConfigError("controller", name, f"a module that can be imported ({error})") from error
-    factory = getattr(module, attribute, None)
-    if not callable(factory):
-        raise ConfigError("controller", name, f"a class or function that {module_name} has")
-    return cast(PilotFactory, factory)
+    return find_named("controller", name)
 
 
 def make_named_pilot(

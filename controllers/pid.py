@@ -21,4 +21,4 @@ class PidGains:
         """All gains are 0 or more."""
         for name in ("kp", "ki", "kd"):
             if not getattr(self, name) >= 0.0:
-                raise ConfigError(f"pid.{name}", getattr(self, name), "a gain of 0 or more")
+                raise ConfigError(name, getattr(self, name), "a gain of 0 or more")

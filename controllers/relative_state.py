@@ -60,7 +60,7 @@ class FilterCfg:
         """All are positive."""
         for name, value in vars(self).items():
             if not value > 0:
-                raise ConfigError(f"control.filter.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
 
 
 class RelativeState(NamedTuple):

@@ -49,11 +49,11 @@ class SearchCfg:
     def __post_init__(self) -> None:
         """Rates and widths are positive."""
         if not self.turn_rate_rad_s > 0.0:
-            raise ConfigError("control.search.turn_rate_rad_s", self.turn_rate_rad_s, "a rate above 0 rad/s")
+            raise ConfigError("turn_rate_rad_s", self.turn_rate_rad_s, "a rate above 0 rad/s")
         if not self.advance_speed_m_s > 0.0:
-            raise ConfigError("control.search.advance_speed_m_s", self.advance_speed_m_s, "a speed above 0 m/s")
+            raise ConfigError("advance_speed_m_s", self.advance_speed_m_s, "a speed above 0 m/s")
         if not self.amplitudes_rad or min(self.amplitudes_rad) <= 0.0:
-            raise ConfigError("control.search.amplitudes_rad", self.amplitudes_rad, "one or more angles above 0 rad")
+            raise ConfigError("amplitudes_rad", self.amplitudes_rad, "one or more angles above 0 rad")
 
 
 class Sight(NamedTuple):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import Any
 
 import numpy as np
 
 from auvdock.core.arrays import Image
 from auvdock.core.landing_station import LandingStationCfg
-from auvdock.optics.gl import offscreen_context
+from auvdock.optics.offscreen import Offscreen
 from auvdock.sim.mj import mujoco
 from auvdock.sim.simulator import Simulator
 
@@ -24,20 +23,15 @@ class ChaseCamera:
         """Remember what to look at."""
         self._simulator = simulator
         self._size = (width_px, height_px)
-        self._process = -1
-        self._gl: Any = None
-        self._context: Any = None
+        self._offscreen: Offscreen | None = None
         self._scene: Any = None
 
     def render(self) -> Image:
         """(H, W, 3) uint8 RGB of the vehicle and what lies before it.
 
         Raises:
-            GraphicsError: no OpenGL context can be had.
+            GraphicsError: no OpenGL context can be had, or it is at work in another thread.
         """
-        if self._process != os.getpid():
-            self._open()
-        self._gl.make_current()
         simulator = self._simulator
         T_world_body = simulator.truth.T_world_body
         forward = T_world_body[:3, 0]
@@ -55,22 +49,15 @@ class ChaseCamera:
         # The simulator leaves derived poses stale while nobody looks; draw from the state itself.
         mujoco.mj_kinematics(simulator.model, simulator.data)
         category = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(simulator.model, simulator.data, mujoco.MjvOption(), None, camera, category, self._scene)
-        width, height = self._size
-        rect = mujoco.MjrRect(0, 0, width, height)
-        mujoco.mjr_render(rect, self._scene, self._context)
-        image = np.empty((height, width, 3), dtype=np.uint8)
-        mujoco.mjr_readPixels(image, None, rect, self._context)
-        return np.ascontiguousarray(image[::-1])
+        offscreen, scene = self._drawn_by()
+        mujoco.mjv_updateScene(simulator.model, simulator.data, mujoco.MjvOption(), None, camera, category, scene)
+        return np.ascontiguousarray(offscreen.draw(scene)[::-1])
 
     def close(self) -> None:
         """Release the OpenGL context."""
-        if self._process == os.getpid():
-            self._gl.make_current()
-            self._context.free()
-            self._gl.free()
-        self._gl = self._context = self._scene = None
-        self._process = -1
+        if self._offscreen is not None:
+            self._offscreen.close()
+        self._offscreen = self._scene = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but OpenGL's state, which lives in one process."""
@@ -80,15 +67,11 @@ class ChaseCamera:
         """A camera without a context."""
         self.__init__(state["simulator"], *state["size"])
 
-    def _open(self) -> None:
-        width, height = self._size
-        model = self._simulator.model
-        self._gl = offscreen_context(width, height)
-        self._gl.make_current()
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        mujoco.mjr_resizeOffscreen(width, height, self._context)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
-        self._scene = mujoco.MjvScene(model, 2 * model.ngeom + 100)
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0  # software rendering takes ten times as long with them
-        self._process = os.getpid()
+    def _drawn_by(self) -> tuple[Offscreen, Any]:
+        if self._offscreen is None or not self._offscreen.is_ours:
+            model = self._simulator.model
+            self._offscreen = Offscreen(model, *self._size)
+            scene = self._scene = mujoco.MjvScene(model, 2 * model.ngeom + 100)
+            scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
+            scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0  # software rendering takes ten times as long with them
+        return self._offscreen, self._scene

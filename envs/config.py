@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 from auvdock.core.beacons import BeaconCfg
 from auvdock.core.camera import CameraCfg
 from auvdock.core.checks import check_range
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, located
 from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.station import ConicalStationCfg, load_conical_station
 from auvdock.envs.room import hull_room
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
+from auvdock.optics.water import WaterCfg
 from auvdock.sim.simulator import SimCfg
 
 __all__ = ["FIDELITIES", "HEADINGS", "LimitsCfg", "StartCfg", "WorldCfg", "check_rates", "rotating_world_cfg"]
@@ -52,13 +53,13 @@ class StartCfg:
     def __post_init__(self) -> None:
         """Refuse impossible starts."""
         if not 2.0 <= self.min_range_m <= self.max_range_m:
-            raise ConfigError("world.start.min_range_m", self.min_range_m, "2 m or more and at most max_range_m")
-        check_range("world.start.max_range_m", self.max_range_m, 0.0, math.inf, "a finite distance")
+            raise ConfigError("min_range_m", self.min_range_m, "2 m or more and at most max_range_m")
+        check_range("max_range_m", self.max_range_m, 0.0, math.inf, "a finite distance")
         if not 0.0 <= self.azimuth_deg <= 180.0:
-            raise ConfigError("world.start.azimuth_deg", self.azimuth_deg, "0 to 180 degrees")
+            raise ConfigError("azimuth_deg", self.azimuth_deg, "0 to 180 degrees")
         for name in ("lateral_m", "vertical_m", "heading_deg"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"world.start.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class LimitsCfg:
         """Refuse limits that end every episode at once."""
         for name in ("max_time_s", "collision_force_n", "surfaced_s", "carried_off_m"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"world.limits.{name}", getattr(self, name), "a number above 0")
+                raise ConfigError(name, getattr(self, name), "a number above 0")
 
 
 @dataclass(frozen=True)
@@ -87,8 +88,8 @@ class WorldCfg:
 
     fidelity: str = "pixels"
     """"pixels" or "beacons"."""
-    water: str = "clear"
-    """Water preset: Jerlov "I" to "9C", "clear", "pool", "lake"."""
+    water: str | WaterCfg = "clear"
+    """Water preset (Jerlov "I" to "9C", "clear", "pool", "lake"), a TOML file of one's own, or that file's content."""
     attenuation_per_m: float | None = None
     """Beam attenuation c at 450 nm in 1/m in place of the preset's."""
     detection_model: str | None = None
@@ -115,9 +116,14 @@ class WorldCfg:
     def __post_init__(self) -> None:
         """Check that the rates divide and the names exist."""
         if self.station_heading not in HEADINGS:
-            raise ConfigError("world.station_heading", self.station_heading, f"one of {', '.join(HEADINGS)}")
+            raise ConfigError("station_heading", self.station_heading, f"one of {', '.join(HEADINGS)}")
         if not 0.0 <= self.frame_drop_share <= 0.95:
-            raise ConfigError("world.frame_drop_share", self.frame_drop_share, "a share of 0 to 0.95")
+            raise ConfigError("frame_drop_share", self.frame_drop_share, "a share of 0 to 0.95")
+        taken = {light.name for light in self.station.beacons} | {f"B{n}" for n in range(self.station.array_count)}
+        for light in self.extra_lights:
+            if light.name in taken:
+                raise ConfigError("extra_lights", light.name, "a name that no other light has, the station's included")
+            taken.add(light.name)
         if self.fidelity not in FIDELITIES:
             raise ConfigError("fidelity", self.fidelity, f"one of {', '.join(FIDELITIES)}")
         check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
@@ -126,7 +132,7 @@ class WorldCfg:
             remedy = (
                 f"a height above the mouth's centre between the floor's, {low_m:g} m, and the surface's, {high_m:g} m"
             )
-            check_range(f"world.extra_lights[{index}].position_m", light.position_m[2], low_m, high_m, remedy)
+            check_range(f"extra_lights[{index}].position_m", light.position_m[2], low_m, high_m, remedy)
         self._check_start()
 
     def _check_start(self) -> None:
@@ -134,17 +140,19 @@ class WorldCfg:
 
         A start is level, with any heading.
         """
-        start, station, room = self.start, self.station, hull_room(self.sim.vehicle)
+        start, station = self.start, self.station
+        with located("sim."):
+            room = hull_room(self.sim.vehicle)
         up_m, down_m = station.depth_m - room.above_m, station.floor_below_m - room.below_m
         if up_m <= 0.0:
-            raise ConfigError("world.station.depth_m", station.depth_m, f"more than {room.above_m:g} m for the vehicle")
+            raise ConfigError("station.depth_m", station.depth_m, f"more than {room.above_m:g} m for the vehicle")
         if down_m <= 0.0:
             raise ConfigError(
-                "world.station.floor_below_m", station.floor_below_m, f"more than {room.below_m:g} m for the vehicle"
+                "station.floor_below_m", station.floor_below_m, f"more than {room.below_m:g} m for the vehicle"
             )
         if start.vertical_m > min(up_m, down_m):
             raise ConfigError(
-                "world.start.vertical_m",
+                "start.vertical_m",
                 start.vertical_m,
                 f"at most {math.floor(1e3 * min(up_m, down_m)) / 1e3:g} m, so that the whole vehicle starts below the "
                 f"surface ({station.depth_m:g} m above the mouth's centre) and above the floor "
@@ -158,7 +166,7 @@ class WorldCfg:
             clear_m += math.hypot(length_m, funnel.mouth_radius_m)
         if start.min_range_m < clear_m:
             remedy = f"{math.ceil(1e3 * clear_m) / 1e3:g} m or more, so that no start touches the station"
-            raise ConfigError("world.start.min_range_m", start.min_range_m, remedy)
+            raise ConfigError("start.min_range_m", start.min_range_m, remedy)
 
 
 def check_rates(physics_hz: float, control_hz: float, camera_hz: float) -> None:
@@ -167,9 +175,9 @@ def check_rates(physics_hz: float, control_hz: float, camera_hz: float) -> None:
     Raises:
         ConfigError: one that does not.
     """
-    for name, rate in (("world.control_hz", control_hz), ("world.camera.rate_hz", camera_hz)):
+    for name, rate in (("control_hz", control_hz), ("camera.rate_hz", camera_hz)):
         steps = physics_hz / rate if rate > 0.0 else 0.0
-        if steps < 1.0 or abs(steps - round(steps)) > 1e-9:
+        if not 1.0 <= steps < 1e6 or abs(steps - round(steps)) > 1e-9:
             raise ConfigError(name, rate, f"a rate that divides the physics rate of {physics_hz:g} Hz")
 
 

@@ -50,7 +50,8 @@ All boxes are float64 and bounded by ±1000, which nothing reaches before the ep
 
 ## Reward
 Progress of the nose towards the latch in metres, less 0.001 times the thruster work in joules, plus 100 on success,
-less 50 on collision, divergence, surfacing or being carried off.
+less 50 on collision, divergence, surfacing or being carried off. `auvdock.envs.reward.RewardCfg` has these numbers, and
+a price of time, as settings.
 
 ## Starting state
 Uniform within `WorldCfg.start`: 15 to 30 m in front of the mouth, ±3 m sideways, ±1.5 m in depth, ±30° of heading.
@@ -59,11 +60,21 @@ Uniform within `WorldCfg.start`: 15 to 30 m in front of the mouth, ±3 m sideway
 Terminated by success, a collision harder than `WorldCfg.limits.collision_force_n`, divergence, a latch that closed on
 an entry outside its limits (`terminal`), a hull that has been partly out of the water for `limits.surfaced_s` in all
 (`surfaced`), or a vehicle `limits.carried_off_m` further from the station than at the start (`carried_off`). Truncated
-after `WorldCfg.limits.max_time_s`. `info` always has `is_success` (bool) and `failure_reason` (str or None).
+after `WorldCfg.limits.max_time_s`, 240 s. `info` always has `is_success` (bool) and `failure_reason` (str or None). A
+step after the end, or before the first reset, raises `gymnasium.error.ResetNeeded`.
 
 ## Arguments
-`cfg` (`WorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`
-(`PerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"), `render_camera` ("chase" or "bow").
+`cfg` (`WorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"; by default the `cfg`'s,
+without a `cfg` "pixels" for images and else "beacons"), `start` (`StartCfg`, or a mapping of the fields to change, in
+place of the `cfg`'s), `reward` (`RewardCfg`, or a mapping of the fields to change), `time_limit_s` (in place of
+`cfg.limits.max_time_s`), `perception` (`PerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"), `render_camera`
+("chase" or "bow").
+
+`gymnasium.make` itself takes `max_episode_steps`, a number of control periods: its own wrapper then truncates, and
+`failure_reason` stays None. Any other argument that cannot be used raises `ConfigError` with its name.
+
+For training, something like `gymnasium.make("auvdock/ConicalDocking-v0", start={"min_range_m": 3, "max_range_m": 5},
+time_limit_s=30)`, wrapped in `auvdock.envs.wrappers.SetPointAction`: the default's 240 s are 7,200 steps.
 
 ## Version history
 - v0: first version.
@@ -71,8 +82,8 @@ after `WorldCfg.limits.max_time_s`. `info` always has `is_success` (bool) and `f
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -80,8 +91,10 @@ from gymnasium import spaces
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import AzimuthFix, Percept
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
-from auvdock.envs.config import WorldCfg
-from auvdock.envs.vehicle_env import BOUND, OBSERVATIONS, VehicleEnv, box, check_options
+from auvdock.envs.config import StartCfg, WorldCfg
+from auvdock.envs.options import OBSERVATIONS, check_options, reward_settings, world_settings
+from auvdock.envs.reward import RewardCfg
+from auvdock.envs.vehicle_env import BOUND, VehicleEnv, box
 from auvdock.envs.world import DockingWorld, Sensed
 from auvdock.perception.detectors import make_station_detector
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
@@ -93,14 +106,18 @@ __all__ = ["OBSERVATIONS", "DockingEnv"]
 class DockingEnv(VehicleEnv):
     """`auvdock/ConicalDocking-v0`; see the module's docstring for the tables."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 30}
+    default_cfg = staticmethod(WorldCfg)
+    """Makes the world where no `cfg` is given."""
 
     def __init__(
         self,
         cfg: WorldCfg | None = None,
         *,
         observation: str = "state",
-        fidelity: str = "beacons",
+        fidelity: str | None = None,
+        start: StartCfg | Mapping[str, Any] | None = None,
+        reward: RewardCfg | Mapping[str, Any] | None = None,
+        time_limit_s: float | None = None,
         perception: PerceptionCfg | None = None,
         render_mode: str | None = None,
         render_camera: str = "chase",
@@ -110,8 +127,8 @@ class DockingEnv(VehicleEnv):
         Raises:
             ConfigError: an option that does not exist or does not fit the others.
         """
-        check_options(observation, fidelity, render_mode, render_camera, ("chase", "bow"))
-        self.cfg = dataclasses.replace(cfg or WorldCfg(), fidelity=fidelity)
+        self.cfg = world_settings(self.default_cfg(), cfg, observation, fidelity, start, time_limit_s)
+        check_options(observation, self.cfg.fidelity, render_mode, render_camera, ("chase", "bow"))
         perception = perception or PerceptionCfg()
         self._world = DockingWorld(self.cfg, perception.detector)
         self._detector = make_station_detector(perception.detector, self.cfg.station)
@@ -124,7 +141,7 @@ class DockingEnv(VehicleEnv):
         )
         self._percept: Percept | None = None
         self._fix: AzimuthFix | None = None
-        super().__init__(self._world, observation, render_mode, render_camera)
+        super().__init__(self._world, observation, self.cfg, reward_settings(reward), render_mode, render_camera)
 
     @property
     def world(self) -> DockingWorld:

@@ -53,7 +53,8 @@ All boxes are float64 and bounded by ±1000, which nothing reaches before the ep
 
 ## Reward
 Progress of the seat towards its place in metres, less 0.001 times the thruster work in joules, plus 100 on success,
-less 50 on collision, divergence, surfacing or being carried off.
+less 50 on collision, divergence, surfacing or being carried off. `auvdock.envs.reward.RewardCfg` has these numbers, and
+a price of time, as settings.
 
 ## Starting state
 Uniform within `LandingWorldCfg.start`: 3 to 6 m above the seat's place, ±1.5 m along and across, ±45° of heading, at
@@ -63,12 +64,18 @@ rest in the water.
 Terminated by success, a collision harder than `LandingWorldCfg.limits.collision_force_n`, divergence, an arm that
 closed after a touchdown that was too hard (`terminal`), a hull that has been partly out of the water for
 `limits.surfaced_s` in all (`surfaced`), or a vehicle `limits.carried_off_m` further from the station than at the start
-(`carried_off`). Truncated after `LandingWorldCfg.limits.max_time_s`. `info` always has `is_success` (bool) and
-`failure_reason` (str or None).
+(`carried_off`). Truncated after `LandingWorldCfg.limits.max_time_s`, 240 s. `info` always has `is_success` (bool) and
+`failure_reason` (str or None). A step after the end, or before the first reset, raises `gymnasium.error.ResetNeeded`.
 
 ## Arguments
-`cfg` (`LandingWorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"), `perception`
-(`LandingPerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"), `render_camera` ("chase" or "belly").
+`cfg` (`LandingWorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"; by default the
+`cfg`'s, without a `cfg` "pixels" for images and else "beacons"), `start` (`LandingStartCfg`, or a mapping of the fields
+to change, in place of the `cfg`'s), `reward` (`RewardCfg`, or a mapping of the fields to change), `time_limit_s` (in
+place of `cfg.limits.max_time_s`), `perception` (`LandingPerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"),
+`render_camera` ("chase" or "belly").
+
+`gymnasium.make` itself takes `max_episode_steps`, a number of control periods: its own wrapper then truncates, and
+`failure_reason` stays None. Any other argument that cannot be used raises `ConfigError` with its name.
 
 ## Version history
 - v0: first version.
@@ -76,17 +83,19 @@ closed after a touchdown that was too hard (`terminal`), a hull that has been pa
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
 from auvdock.core.arrays import Array
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
-from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.landing_world import LandingWorld
-from auvdock.envs.vehicle_env import VehicleEnv, box, check_options
+from auvdock.envs.options import check_options, reward_settings, world_settings
+from auvdock.envs.reward import RewardCfg
+from auvdock.envs.vehicle_env import VehicleEnv, box
 from auvdock.envs.vehicle_world import Sensed
 from auvdock.perception.detectors import make_detector
 from auvdock.perception.landing.config import LandingPerceptionCfg
@@ -102,14 +111,15 @@ _LEVELS = {"none": 0.0, "lights": 1.0, "tag": 2.0, "fused": 3.0}
 class LandingEnv(VehicleEnv):
     """`auvdock/LandingDocking-v0`; see the module's docstring for the tables."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 20}
-
     def __init__(
         self,
         cfg: LandingWorldCfg | None = None,
         *,
         observation: str = "state",
-        fidelity: str = "beacons",
+        fidelity: str | None = None,
+        start: LandingStartCfg | Mapping[str, Any] | None = None,
+        reward: RewardCfg | Mapping[str, Any] | None = None,
+        time_limit_s: float | None = None,
         perception: LandingPerceptionCfg | None = None,
         render_mode: str | None = None,
         render_camera: str = "chase",
@@ -119,8 +129,8 @@ class LandingEnv(VehicleEnv):
         Raises:
             ConfigError: an option that does not exist or does not fit the others.
         """
-        check_options(observation, fidelity, render_mode, render_camera, ("chase", "belly"))
-        self.cfg = dataclasses.replace(cfg or LandingWorldCfg(), fidelity=fidelity)
+        self.cfg = world_settings(LandingWorldCfg(), cfg, observation, fidelity, start, time_limit_s)
+        check_options(observation, self.cfg.fidelity, render_mode, render_camera, ("chase", "belly"))
         perception = perception or LandingPerceptionCfg()
         self._world = LandingWorld(self.cfg, perception.detector, perception.tag_detector)
         self._detector = make_detector(perception.detector)
@@ -128,7 +138,7 @@ class LandingEnv(VehicleEnv):
         self._perception = LandingPerception(perception, self._world.camera, self.cfg.station)
         self._percept: LandingPercept | None = None
         self._seat = np.append(self._world.simulator.vehicle.seat_body_m, 1.0)
-        super().__init__(self._world, observation, render_mode, render_camera)
+        super().__init__(self._world, observation, self.cfg, reward_settings(reward), render_mode, render_camera)
 
     @property
     def world(self) -> LandingWorld:

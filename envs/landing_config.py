@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from auvdock.core.calibrated_camera import CalibratedCameraCfg
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, located
 from auvdock.core.landing_station import LandingStationCfg, load_landing_station
 from auvdock.envs.config import FIDELITIES, LimitsCfg, check_rates
 from auvdock.envs.room import hull_room
@@ -15,6 +15,7 @@ from auvdock.optics.lamp import LampCfg
 from auvdock.optics.landing_camera import landing_imaging
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.settings import ImagingCfg
+from auvdock.optics.water import WaterCfg
 from auvdock.sim.simulator import SimCfg
 
 __all__ = ["LandingStartCfg", "LandingWorldCfg"]
@@ -38,10 +39,10 @@ class LandingStartCfg:
     def __post_init__(self) -> None:
         """Refuse impossible starts."""
         if not 0.5 <= self.min_height_m <= self.max_height_m:
-            raise ConfigError("world.start.min_height_m", self.min_height_m, "0.5 m or more and at most max_height_m")
+            raise ConfigError("min_height_m", self.min_height_m, "0.5 m or more and at most max_height_m")
         for name in ("max_height_m", "lateral_m", "heading_deg"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"world.start.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ class LandingWorldCfg:
 
     fidelity: str = "pixels"
     """"pixels" or "beacons"."""
-    water: str = "clear"
-    """Water preset: Jerlov "I" to "9C", "clear", "pool", "lake"."""
+    water: str | WaterCfg = "clear"
+    """Water preset (Jerlov "I" to "9C", "clear", "pool", "lake"), a TOML file of one's own, or that file's content."""
     attenuation_per_m: float | None = None
     """Beam attenuation c at 450 nm in 1/m in place of the preset's."""
     detection_model: str | None = None
@@ -77,23 +78,23 @@ class LandingWorldCfg:
         check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
         periods = self.control_hz / self.camera.rate_hz
         if abs(periods - round(periods)) > 1e-9:
-            raise ConfigError(
-                "world.control_hz", self.control_hz, f"a multiple of the camera's {self.camera.rate_hz:g} Hz"
-            )
+            raise ConfigError("control_hz", self.control_hz, f"a multiple of the camera's {self.camera.rate_hz:g} Hz")
         self._check_start()
 
     def _check_start(self) -> None:
         """Refuse starts of which some draw would lie out of the water or in the guides; a start is level."""
-        start, guide, room = self.start, self.station.guide, hull_room(self.sim.vehicle)
+        start, guide = self.start, self.station.guide
+        with located("sim."):
+            room = hull_room(self.sim.vehicle)
         most_m = self.station.depth_m - guide.seat_height_m - room.above_seat_m
         least_m = guide.top_m - guide.seat_height_m + room.below_seat_m
         if start.max_height_m > most_m:
             raise ConfigError(
-                "world.start.max_height_m",
+                "start.max_height_m",
                 start.max_height_m,
                 f"at most {math.floor(1e3 * most_m) / 1e3:g} m, a start below the surface: the station lies "
                 f"{self.station.depth_m:g} m deep",
             )
         if start.min_height_m < least_m:
             remedy = f"{math.ceil(1e3 * least_m) / 1e3:g} m or more, a start above the guides"
-            raise ConfigError("world.start.min_height_m", start.min_height_m, remedy)
+            raise ConfigError("start.min_height_m", start.min_height_m, remedy)

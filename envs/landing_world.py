@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from auvdock.core.arrays import Array, Image
+from auvdock.core.arrays import Array
 from auvdock.core.calibrated_camera import CalibratedCameraCfg, make_calibrated_camera
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Proprioception
+from auvdock.core.errors import located
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.marine import flip_vector
 from auvdock.core.strict import load_toml
@@ -20,6 +21,7 @@ from auvdock.core.vehicle import VehicleCfg
 from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.vehicle_world import Sensed, Start, VehicleWorld
 from auvdock.optics.detection_model import DetectionModelCfg
+from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.landing_camera import LandingCamera
 from auvdock.optics.landing_sensing import LandingSensor
 from auvdock.sim.truth import Truth
@@ -68,16 +70,16 @@ class LandingWorld(VehicleWorld):
             cfg.faults,
             self.simulator.T_world_station,
         )
-        self.imager = LandingCamera(*optics, scene=self.simulator)
+        with located("world.faults."):
+            self.imager = LandingCamera(*optics, scene=self.simulator)
         self._sensor: LandingSensor | None = None
         if cfg.fidelity == "beacons":
             path = cfg.detection_model
-            self._sensor = LandingSensor(
-                *optics,
-                detector_name=detector,
-                tag_detector_name=tag_detector,
-                model=None if path is None else load_toml(DetectionModelCfg, Path(path)),
-            )
+            model = None if path is None else load_toml(DetectionModelCfg, Path(path))
+            with located("perception."):
+                self._sensor = LandingSensor(
+                    *optics, detector_name=detector, tag_detector_name=tag_detector, model=model
+                )
 
     def _draw_start(self, rng: np.random.Generator) -> Start:
         cfg = self.cfg
@@ -97,10 +99,8 @@ class LandingWorld(VehicleWorld):
             return Sensed(proprioception, None, detections, tags)
         return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s), None)
 
-    def picture(self) -> Image:
-        """(H, W, 3) uint8 RGB of what the camera sees now."""
-        truth = self.truth
-        return self.imager.capture(truth.T_world_body, truth.time_s).image
+    def _rendered_camera(self) -> UnderwaterCamera:
+        return self.imager
 
     def close(self) -> None:
         """Release the renderer."""

@@ -50,8 +50,8 @@ tell the time: the newest frame's is that of the observation. Needs `fidelity="p
 
 ## Reward
 Progress of the nose towards the latch in metres (straight, though the way leads around the station), less 0.001 times
-the thruster work in joules, plus 100 on success, less 50 on collision, divergence, surfacing or being
-carried off.
+the thruster work in joules, plus 100 on success, less 50 on collision, divergence, surfacing or being carried off;
+`auvdock.envs.reward.RewardCfg` has these numbers, and a price of time, as settings.
 
 ## Starting state
 Uniform within `WorldCfg.start`: radius 20 to 45 m, azimuth ±180°, ±1.5 m in depth, any heading. With
@@ -62,8 +62,13 @@ As in `auvdock/ConicalDocking-v0`, with `WorldCfg.limits.max_time_s` 600 s.
 
 ## Arguments
 `cfg` (`WorldCfg`, by default `auvdock.envs.config.rotating_world_cfg()`), `observation` ("state", "pose", "image"),
-`fidelity` ("pixels", "beacons"), `perception` (`PerceptionCfg`, used by "pose"), `render_mode` ("rgb_array"),
-`render_camera` ("chase" or "bow").
+`fidelity` ("pixels", "beacons"; by default the `cfg`'s, without a `cfg` "pixels" for images and else "beacons"),
+`start` (`StartCfg`, or a mapping of the fields to change, in place of the `cfg`'s), `reward` (`RewardCfg`, or a mapping
+of the fields to change), `time_limit_s` (in place of `cfg.limits.max_time_s`), `perception` (`PerceptionCfg`, used by
+"pose"), `render_mode` ("rgb_array"), `render_camera` ("chase" or "bow").
+
+`gymnasium.make` itself takes `max_episode_steps`, a number of control periods: its own wrapper then truncates, and
+`failure_reason` stays None. Any other argument that cannot be used raises `ConfigError` with its name.
 
 ## Version history
 - v0: first version.
@@ -71,36 +76,13 @@ As in `auvdock/ConicalDocking-v0`, with `WorldCfg.limits.max_time_s` 600 s.
 
 from __future__ import annotations
 
-from auvdock.envs.config import WorldCfg, rotating_world_cfg
+from auvdock.envs.config import rotating_world_cfg
 from auvdock.envs.docking import DockingEnv
-from auvdock.perception.pipeline import PerceptionCfg
 
 __all__ = ["RotatingDockingEnv"]
 
 
 class RotatingDockingEnv(DockingEnv):
-    """`auvdock/RotatingBeaconDocking-v0`; see the module's docstring for the tables."""
+    """`auvdock/RotatingBeaconDocking-v0`; see the module's docstring for the tables, `DockingEnv` for the arguments."""
 
-    def __init__(
-        self,
-        cfg: WorldCfg | None = None,
-        *,
-        observation: str = "state",
-        fidelity: str = "beacons",
-        perception: PerceptionCfg | None = None,
-        render_mode: str | None = None,
-        render_camera: str = "chase",
-    ) -> None:
-        """Build the environment; no renderer is made before an image is asked for.
-
-        Raises:
-            ConfigError: an option that does not exist or does not fit the others.
-        """
-        super().__init__(
-            cfg or rotating_world_cfg(),
-            observation=observation,
-            fidelity=fidelity,
-            perception=perception,
-            render_mode=render_mode,
-            render_camera=render_camera,
-        )
+    default_cfg = staticmethod(rotating_world_cfg)

@@ -8,17 +8,20 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 
 from auvdock.core.arrays import Array, Image
 from auvdock.core.contracts import Proprioception
-from auvdock.core.errors import ConfigError
+from auvdock.envs.actions import checked_action
 from auvdock.envs.chase import ChaseCamera
+from auvdock.envs.config import WorldCfg
+from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.envs.reward import RewardCfg
 from auvdock.envs.vehicle_world import Sensed, VehicleWorld
 from auvdock.sim.truth import Truth
 
-__all__ = ["BOUND", "OBSERVATIONS", "Observation", "VehicleEnv", "box", "check_options", "proprioception_vector"]
+__all__ = ["BOUND", "Observation", "VehicleEnv", "box", "proprioception_vector"]
 
-OBSERVATIONS = ("state", "pose", "image")
 BOUND = 1000.0
 """Bound of every observed number, in its own unit."""
 
@@ -26,19 +29,45 @@ Observation = Array | dict[str, Any]
 
 
 class VehicleEnv(gymnasium.Env[Any, Any], ABC):
-    """A `VehicleWorld` as a Gymnasium environment; a kind of docking says what is observed and how far it is to go."""
+    """A `VehicleWorld` as a Gymnasium environment; a kind of docking says what is observed and how far it is to go.
 
-    def __init__(self, world: VehicleWorld, observation: str, render_mode: str | None, render_camera: str) -> None:
+    A copy, by `copy.deepcopy` or pickle, goes on in mid-episode as the original does, bit for bit. OpenGL contexts are
+    not copied: a copy makes its own at its first picture.
+
+    Attributes:
+        observation: one of `auvdock.envs.options.OBSERVATIONS`.
+        reward_cfg: what a step pays.
+        control_s: length of a step in s.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012 - each has its own
+
+    def __init__(
+        self,
+        world: VehicleWorld,
+        observation: str,
+        cfg: WorldCfg | LandingWorldCfg,
+        reward: RewardCfg,
+        render_mode: str | None,
+        render_camera: str,
+    ) -> None:
         """Wrap a world; the options have been checked.
 
         Args:
             world: the world.
-            observation: one of `OBSERVATIONS`.
+            observation: one of `auvdock.envs.options.OBSERVATIONS`.
+            cfg: the world's settings.
+            reward: what a step pays.
             render_mode: "rgb_array" or None.
             render_camera: "chase", or anything else for the pilot's camera.
         """
         self.observation = observation
+        self.reward_cfg = reward
         self.render_mode = render_mode
+        self.metadata = {**type(self).metadata, "render_fps": round(cfg.control_hz, 3)}
+        self.control_s = 1.0 / cfg.control_hz
+        self._takes_frames = cfg.fidelity == "pixels" and observation != "state"
+        self._halt: str | None = "not begun"
         self._render_camera = render_camera
         self._vehicle_world = world
         self._chase = ChaseCamera(world.simulator)
@@ -46,8 +75,8 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
         self._image: Image | None = None
         self._distance_m = 0.0
         self._energy_j = 0.0
-        actuators = len(world.simulator.vehicle.actuators)
-        self.action_space = spaces.Box(-1.0, 1.0, (actuators,), np.float32)
+        self._actuators = len(world.simulator.vehicle.actuators)
+        self.action_space = spaces.Box(-1.0, 1.0, (self._actuators,), np.float32)
         self.observation_space = self._make_observation_space()
 
     @abstractmethod
@@ -75,14 +104,19 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
         """Distance from where the latch closes."""
 
     @property
+    def world(self) -> VehicleWorld:
+        """The world inside, for metrics."""
+        return self._vehicle_world
+
+    @property
     def proprioception(self) -> Proprioception:
         """The vehicle's own sensors at the last step; what the action wrappers steer by.
 
         Raises:
-            ConfigError: the environment has not been reset.
+            ResetNeeded: the environment has not been reset.
         """
         if self._sensed is None:
-            raise ConfigError("env", "not reset", "env.reset() before the first step")
+            raise ResetNeeded("the episode has not begun: call env.reset() first")
         return self._sensed.proprioception
 
     def reset(
@@ -97,19 +131,28 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
         truth = self._vehicle_world.truth
         self._distance_m = self._distance_to_go_m(truth)
         self._energy_j = 0.0
+        self._halt = None
         return self._observe(truth), self._info(truth)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:  # noqa: ANN401
-        """Apply actuator commands for one control period."""
+        """Apply actuator commands for one control period.
+
+        Raises:
+            ResetNeeded: before the first `reset`, or after the step that ended the episode.
+            ValueError: an action of another shape, or one that holds something that is not a number.
+        """
+        if self._halt is not None:
+            raise ResetNeeded(f"the episode has {self._halt}: call env.reset() before the next step")
         world = self._vehicle_world
-        values = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
-        world.step(values)
+        world.step(checked_action(action, self._actuators))
         self._sense()
         truth = world.truth
         end = world.end
         success = world.is_success
         truncated = not success and end == "timeout"
         terminated = success or (end is not None and not truncated)
+        if terminated or truncated:
+            self._halt = f"ended ({'success' if success else end})"
         return self._observe(truth), self._reward(truth, success, end), terminated, truncated, self._info(truth)
 
     def render(self) -> Any:  # noqa: ANN401
@@ -120,6 +163,8 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
             return self._chase.render()
         if self._image is not None:
             return self._image
+        if self._takes_frames:
+            return self._blank()  # no frame has come through yet, and taking one here would change the episode
         return self._vehicle_world.picture()
 
     def close(self) -> None:
@@ -140,13 +185,9 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
 
     def _reward(self, truth: Truth, success: bool, end: str | None) -> float:
         distance_m = self._distance_to_go_m(truth)
-        reward = self._distance_m - distance_m - 0.001 * (truth.energy_j - self._energy_j)
+        progress_m, work_j = self._distance_m - distance_m, truth.energy_j - self._energy_j
         self._distance_m, self._energy_j = distance_m, truth.energy_j
-        if success:
-            reward += 100.0
-        elif end in ("diverged", "collision", "surfaced", "carried_off"):
-            reward -= 50.0
-        return float(reward)
+        return float(self.reward_cfg.of(progress_m, work_j, self.control_s, success=success, end=end))
 
     def _info(self, truth: Truth) -> dict[str, Any]:
         success = self._vehicle_world.is_success
@@ -198,24 +239,6 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
     def _blank(self) -> Image:
         camera = self._vehicle_world.camera
         return np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
-
-
-def check_options(
-    observation: str, fidelity: str, render_mode: str | None, camera: str, cameras: tuple[str, str]
-) -> None:
-    """Refuse options that do not exist or do not fit each other.
-
-    Raises:
-        ConfigError: the first such option.
-    """
-    if observation not in OBSERVATIONS:
-        raise ConfigError("observation", observation, f"one of {', '.join(OBSERVATIONS)}")
-    if render_mode not in (None, "rgb_array"):
-        raise ConfigError("render_mode", render_mode, "'rgb_array' or None")
-    if camera not in cameras:
-        raise ConfigError("render_camera", camera, " or ".join(repr(name) for name in cameras))
-    if observation == "image" and fidelity != "pixels":
-        raise ConfigError("fidelity", fidelity, "'pixels', image observations need rendered frames")
 
 
 def box(*shape: int) -> spaces.Box:

@@ -15,14 +15,15 @@ from auvdock.assets import asset_names
 from auvdock.core.arrays import Array, Image
 from auvdock.core.camera import Camera, CameraCfg, make_camera
 from auvdock.core.contracts import Detections, Frame, Proprioception, TagDetection
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, located
 from auvdock.core.marine import flip_vector
 from auvdock.core.stations import StationCfg
 from auvdock.core.strict import load_toml
-from auvdock.core.vehicle import MountCfg, VehicleCfg
+from auvdock.core.vehicle import MountCfg, VehicleCfg, load_vehicle
 from auvdock.envs.config import LimitsCfg
 from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
-from auvdock.optics.water import load_water, with_attenuation
+from auvdock.optics.imaging import UnderwaterCamera
+from auvdock.optics.water import WaterCfg, load_water, with_attenuation
 from auvdock.sim.ocean import CurrentCfg
 from auvdock.sim.simulator import SimCfg, Simulator
 from auvdock.sim.truth import Truth
@@ -68,8 +69,13 @@ class WorldSettings(Protocol):
     """What the configurations of all worlds have in common."""
 
     @property
-    def water(self) -> str:
-        """Water preset."""
+    def fidelity(self) -> str:
+        """One of `auvdock.envs.config.FIDELITIES`."""
+        ...
+
+    @property
+    def water(self) -> str | WaterCfg:
+        """Water preset, file, or water."""
         ...
 
     @property
@@ -117,11 +123,17 @@ class VehicleWorld(ABC):
         Raises:
             ConfigError: a preset that does not exist or a value that does not fit.
         """
-        self.simulator = Simulator(cfg.sim, station)
-        self.camera = make_camera(self.simulator.vehicle)
-        self.water = load_water(cfg.water)
-        if cfg.attenuation_per_m is not None:
-            self.water = with_attenuation(self.water, cfg.attenuation_per_m, "world.attenuation_per_m")
+        with located("world.station."):
+            _ = station.layout  # before whoever uses it: here it is known where its settings lie
+        with located("world.sim."):
+            vehicle = load_vehicle(cfg.sim.vehicle)
+        self.simulator = Simulator(cfg.sim, station, vehicle)
+        with located("world.camera."):
+            self.camera = make_camera(vehicle)
+        with located("world."):
+            self.water = load_water(cfg.water)
+            if cfg.attenuation_per_m is not None:
+                self.water = with_attenuation(self.water, cfg.attenuation_per_m)
         self._limits, self._hold_s, self._control_s = cfg.limits, station.latch.hold_s, 1.0 / cfg.control_hz
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)
         self._steps_per_frame = round(cfg.sim.physics_hz / self.camera.rate_hz)
@@ -131,6 +143,9 @@ class VehicleWorld(ABC):
         self._station_m: list[float] = self.simulator.T_world_station[:3, 3].tolist()
         self._start_distance_m = 0.0
         self._truth: Truth | None = None
+        self._renders_apart = cfg.fidelity == "beacons"
+        self._seed, self._pictured = 0, False
+        self._camera_rng: np.random.Generator | None = None
 
     @abstractmethod
     def _draw_start(self, rng: np.random.Generator) -> Start:
@@ -148,8 +163,23 @@ class VehicleWorld(ABC):
         """Take a frame, or what stands in for it."""
 
     @abstractmethod
+    def _rendered_camera(self) -> UnderwaterCamera:
+        """The camera that the pilot looks through, as one that renders."""
+
     def picture(self) -> Image:
-        """(H, W, 3) uint8 RGB of what the pilot's camera sees now, in whatever fidelity."""
+        """(H, W, 3) uint8 RGB of what the pilot's camera sees now, in whatever fidelity.
+
+        In `beacons` a camera that the episode does without takes it, under the same lights: which pictures an episode
+        shows follows from its seed and from when they were asked for, and the episode does not depend on them.
+        """
+        camera = self._rendered_camera()
+        if not self._renders_apart:
+            self._start_camera()
+        elif not self._pictured:
+            self._pictured = True
+            camera.reset(_streams(self._seed)[2])
+        truth = self.truth
+        return camera.capture(truth.T_world_body, truth.time_s).image
 
     @abstractmethod
     def close(self) -> None:
@@ -157,8 +187,7 @@ class VehicleWorld(ABC):
 
     def reset(self, seed: int) -> None:
         """Start a new episode; the seed alone decides everything that is drawn in it."""
-        children = np.random.SeedSequence(seed).spawn(4)
-        start, physics, camera, link = (np.random.default_rng(child) for child in children)
+        start, physics, camera, link = _streams(seed)
         drawn = self._draw_start(start)
         self.simulator.reset(
             drawn.position_m,
@@ -167,13 +196,14 @@ class VehicleWorld(ABC):
             current=drawn.current,
             compass_datum_rad=drawn.compass_datum_rad,
         )
-        self._reset_camera(camera)
+        self._camera_rng = camera
         self._reset_link(link)
         self._step_count = 0
         self._last_frame_step = -self._steps_per_frame
         self._latched_at_s = None
         self._truth = None
         self._start_distance_m = self._distance_m()
+        self._seed, self._pictured = seed, False
 
     def step(self, values: Array) -> None:
         """Apply actuator commands (n,) in [-1, 1] for one control period."""
@@ -189,7 +219,14 @@ class VehicleWorld(ABC):
         if self._step_count - self._last_frame_step < self._steps_per_frame:
             return Sensed(proprioception, None, None)
         self._last_frame_step = self._step_count
+        self._start_camera()
         return self._look(self.truth, proprioception)
+
+    def _start_camera(self) -> None:
+        """Start the episode's optics when the first frame is due: an episode in which nobody looks does without."""
+        if self._camera_rng is not None:
+            self._reset_camera(self._camera_rng)
+            self._camera_rng = None
 
     @property
     def truth(self) -> Truth:
@@ -228,6 +265,11 @@ class VehicleWorld(ABC):
         return self.truth.docked
 
 
+def _streams(seed: int) -> list[np.random.Generator]:
+    """Generators of an episode: start, physics and sensors, camera, clock and lost frames."""
+    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
+
+
 def detection_model(path: str | None, detector: str) -> DetectionModelCfg:
     """The fitted behaviour that the `beacons` fidelity draws from: of a file, or the detector's own.
 
@@ -238,7 +280,9 @@ def detection_model(path: str | None, detector: str) -> DetectionModelCfg:
         return load_toml(DetectionModelCfg, Path(path))
     if detector not in asset_names("detection"):
         remedy = "world.detection_model a file that `auvdock fit-detector` wrote for it, or fidelity 'pixels'"
-        raise ConfigError("detector", detector, f"{remedy}: the beacons fidelity knows only fitted detectors")
+        raise ConfigError(
+            "perception.detector", detector, f"{remedy}: the beacons fidelity knows only fitted detectors"
+        )
     return load_detection_model(detector)
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from auvdock.core.arrays import Array, Image
+from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.contracts import Proprioception
 from auvdock.core.transforms import quat_wxyz_from_euler_zyx
@@ -100,10 +100,8 @@ class DockingWorld(VehicleWorld):
             return Sensed(proprioception, None, detections)
         return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s, station_s), None)
 
-    def picture(self) -> Image:
-        """(H, W, 3) uint8 RGB of what the camera sees now."""
-        truth = self.truth
-        return self.imager.capture(truth.T_world_body, truth.time_s).image
+    def _rendered_camera(self) -> UnderwaterCamera:
+        return self.imager
 
     def close(self) -> None:
         """Release the renderer."""

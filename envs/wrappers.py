@@ -5,7 +5,9 @@
 | `BodyWrenchAction` | surge X, sway Y, heave Z, pitch M, yaw N | the most that the thrusters give on that axis alone |
 | `SetPointAction` | surge, sway, heave, heading change | 1 m/s, 0.3 m/s, 0.3 m/s, 0.5 rad |
 
-Both use only the vehicle's own sensors.
+Both use only the vehicle's own sensors, wrap the environments of all stations, and refuse what the environments refuse:
+another shape, or a value that is not a number. A vehicle whose thrusters act on roll is kept level by `SetPointAction`;
+`BodyWrenchAction` asks for no moment in roll.
 """
 
 from __future__ import annotations
@@ -16,23 +18,32 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from auvdock.controllers.allocation import ThrustAllocator
+from auvdock.controllers.allocation import AllocationCfg, ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotSetpoint
+from auvdock.controllers.landing.config import HoverAllocationCfg, HoverAutopilotCfg
 from auvdock.core.arrays import Array
 from auvdock.core.vehicle import VehicleCfg
-from auvdock.envs.docking import DockingEnv
+from auvdock.envs.actions import checked_action
+from auvdock.envs.landing import LandingEnv
+from auvdock.envs.vehicle_env import VehicleEnv
 
 __all__ = ["BodyWrenchAction", "SetPointAction"]
 
 _AXES = (0, 1, 2, 4, 5)
-"""Surge, sway, heave, pitch, yaw; no actuator acts in roll."""
+"""Surge, sway, heave, pitch, yaw."""
 
 
-def _docking(env: gymnasium.Env[Any, Any]) -> DockingEnv:
+def _docking(env: gymnasium.Env[Any, Any]) -> VehicleEnv:
     inner = env.unwrapped
-    if not isinstance(inner, DockingEnv):
+    if not isinstance(inner, VehicleEnv):
         raise TypeError(f"{type(inner).__name__} is no docking environment")
     return inner
+
+
+def _allocator(env: VehicleEnv) -> ThrustAllocator:
+    """Shares a wrench as the station's own pilot does."""
+    cfg = HoverAllocationCfg() if isinstance(env, LandingEnv) else AllocationCfg()
+    return ThrustAllocator(env.world.simulator.vehicle, cfg)
 
 
 def _reach(vehicle: VehicleCfg) -> Array:
@@ -50,15 +61,20 @@ class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         """Wrap a docking environment."""
         super().__init__(env)
-        vehicle = _docking(env).world.simulator.vehicle
-        self._allocator = ThrustAllocator(vehicle)
-        self._reach = _reach(vehicle)
+        inner = _docking(env)
+        self._allocator = _allocator(inner)
+        self._reach = _reach(inner.world.simulator.vehicle)
         self.action_space = spaces.Box(-1.0, 1.0, (len(_AXES),), np.float32)
 
     def action(self, action: Any) -> Any:  # noqa: ANN401
-        """Actuator commands for a wrench."""
+        """Actuator commands for a wrench.
+
+        Raises:
+            ValueError: another shape, or a value that is not a number.
+            ResetNeeded: the environment has not been reset.
+        """
         wrench = np.zeros(6)
-        wrench[list(_AXES)] = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        wrench[list(_AXES)] = checked_action(action, len(_AXES))
         surge_m_s = float(_docking(self.env).proprioception.velocity_water_m_s[0])
         return self._allocator.allocate(wrench * self._reach, surge_m_s).astype(np.float32)
 
@@ -73,12 +89,17 @@ class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any]):
     """m/s ahead, m/s to port, m/s up, rad to port."""
 
     def __init__(self, env: gymnasium.Env[Any, Any], cfg: AutopilotCfg | None = None) -> None:
-        """Wrap a docking environment."""
+        """Wrap a docking environment.
+
+        Args:
+            env: the environment.
+            cfg: the autopilot; by default the station's own pilot's.
+        """
         super().__init__(env)
         inner = _docking(env)
-        vehicle = inner.world.simulator.vehicle
-        self._autopilot = Autopilot(vehicle, cfg or AutopilotCfg(), 1.0 / inner.cfg.control_hz)
-        self._allocator = ThrustAllocator(vehicle)
+        own = HoverAutopilotCfg() if isinstance(inner, LandingEnv) else AutopilotCfg()
+        self._autopilot = Autopilot(inner.world.simulator.vehicle, cfg or own, inner.control_s)
+        self._allocator = _allocator(inner)
         self._state = self._autopilot.initial_state()
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
 
@@ -88,9 +109,14 @@ class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any]):
         return super().reset(seed=seed, options=options)
 
     def action(self, action: Any) -> Any:  # noqa: ANN401
-        """Actuator commands for set-points."""
+        """Actuator commands for set-points.
+
+        Raises:
+            ValueError: another shape, or a value that is not a number.
+            ResetNeeded: the environment has not been reset.
+        """
         own = _docking(self.env).proprioception
-        share = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0) * self.SCALE
+        share = checked_action(action, len(self.SCALE)) * self.SCALE
         surge, sway, heave, turn = (float(part) for part in share)
         setpoint = AutopilotSetpoint(surge, sway, heave, 0.0, float(own.euler_zyx_rad[2]) + turn)
         wrench, self._state = self._autopilot.step(self._state, setpoint, own)

@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
 
 from scipy.special import ndtri
 
 from auvdock.core.errors import ConfigError
+from auvdock.core.strict import setting_type
+from auvdock.episode.config import AnyEpisodeCfg
 
-__all__ = ["ALIASES", "DISTRIBUTIONS", "AxisCfg", "AxisValue", "joint_changes", "nested", "parse_axis"]
+__all__ = [
+    "ALIASES",
+    "DISTRIBUTIONS",
+    "KIND_WORDS",
+    "WATER_AXES",
+    "AxisCfg",
+    "AxisValue",
+    "axis_kind",
+    "joined",
+    "nested",
+]
 
 AxisValue = float | int | str | bool
 """What an axis can set."""
@@ -40,12 +54,18 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
 }
 """Short names of axes and the episode's settings that each sets; any other dotted setting is its own name."""
 
+WATER_AXES = ("water", "world.water")
+"""Names of the axis that varies the water, whose values may be files."""
+
 DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 """`normal` has 95 % of its mass between low and high and is cut off there."""
 
-_NAMED = ("detector", "controller", "perception.detector", "control.controller")
-"""Axes whose values are names: a colon in them is that of "package.module:Name", not of a range."""
-
+KIND_WORDS: Mapping[type[AxisValue], str] = {
+    float: "finite numbers",
+    int: "whole numbers",
+    bool: "true or false",
+    str: "text",
+}
 _TAIL = 0.025
 
 
@@ -72,24 +92,23 @@ class AxisCfg:
 
     def __post_init__(self) -> None:
         """Refuse axes without values or with two meanings."""
-        field = f"axes.{self.name}"
         if self.values:
             if self.low is not None or self.high is not None or self.count:
-                raise ConfigError(field, self.values, "either values or low and high")
+                raise ConfigError("values", self.values, "either values or low and high")
             kinds = {_kind(value) for value in self.values}
             if len(kinds) != 1 or len(set(self.values)) != len(self.values):
-                raise ConfigError(field, self.values, "different values of one kind")
+                raise ConfigError("values", self.values, "different values of one kind")
             return
         if self.low is None or self.high is None:
-            raise ConfigError(field, (self.low, self.high), "values, or low and high")
+            raise ConfigError("values", (), f"values for the axis {self.name!r}, or low and high in their place")
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
-            raise ConfigError(field, (self.low, self.high), "finite numbers with low below high")
+            raise ConfigError("low", self.low, f"finite numbers with low below high, which is {self.high}")
         if self.count < 0 or self.count == 1:
-            raise ConfigError(f"{field}.count", self.count, "2 or more grid values, or 0 to draw from a distribution")
+            raise ConfigError("count", self.count, "2 or more grid values, or 0 to draw from a distribution")
         if self.distribution not in DISTRIBUTIONS:
-            raise ConfigError(f"{field}.distribution", self.distribution, f"one of {', '.join(DISTRIBUTIONS)}")
+            raise ConfigError("distribution", self.distribution, f"one of {', '.join(DISTRIBUTIONS)}")
         if self.distribution == "log_uniform" and self.low <= 0.0:
-            raise ConfigError(f"{field}.low", self.low, "a number above 0 for log_uniform")
+            raise ConfigError("low", self.low, "a number above 0 for log_uniform")
 
     @property
     def is_grid(self) -> bool:
@@ -107,11 +126,6 @@ class AxisCfg:
         step = 1.0 / (self.count - 1)
         return tuple(round(self.quantile(index * step, "uniform"), 12) for index in range(self.count))
 
-    @property
-    def kind(self) -> type[AxisValue]:
-        """Python type of the values."""
-        return _kind(self.values[0]) if self.values else float
-
     def quantile(self, probability: float, distribution: str | None = None) -> float:
         """Value of a drawn axis at a cumulative probability."""
         if self.low is None or self.high is None:
@@ -123,6 +137,32 @@ class AxisCfg:
             middle, half = (self.low + self.high) / 2.0, (self.high - self.low) / 2.0
             return middle + half * float(ndtri(_TAIL + probability * (1.0 - 2.0 * _TAIL)) / ndtri(1.0 - _TAIL))
         return self.low + probability * (self.high - self.low)
+
+    def drawn(self, probability: float, kind: type[AxisValue]) -> AxisValue:
+        """Value of a drawn axis at a cumulative probability, of the type `kind`.
+
+        Whole numbers are drawn with a half to either side and rounded: each of a uniform axis is as likely as another.
+        """
+        if kind is not int or self.low is None or self.high is None:
+            return self.typed(self.quantile(probability), kind)
+        low, high = (int(self.typed(end, int)) for end in (self.low, self.high))
+        wide = replace(self, low=self.low - 0.5, high=self.high + 0.5)
+        return min(max(round(wide.quantile(probability)), low), high)
+
+    def typed(self, value: AxisValue, kind: type[AxisValue]) -> AxisValue:
+        """`value` as the setting has it: 4 and 4.0 are the same on an axis, but not in a configuration.
+
+        Raises:
+            ConfigError: a value that the type `kind` does not hold.
+        """
+        if type(value) is kind:
+            return value
+        number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+        if kind is float and math.isfinite(number):
+            return number
+        if kind is int and number.is_integer():
+            return int(number)
+        raise ConfigError(self.name, value, f"{KIND_WORDS[kind]}, as this setting is")
 
     def changes(self, value: AxisValue) -> dict[str, Any]:
         """The nested change of an episode's configuration that `value` stands for; nothing for `level`."""
@@ -136,12 +176,12 @@ class AxisCfg:
         return result
 
 
-def joint_changes(axes: Sequence[AxisCfg], values: Sequence[AxisValue]) -> dict[str, Any]:
-    """What the axes together change of an episode's configuration: some values fit only beside one another's."""
-    changes: dict[str, Any] = {}
-    for axis, value in zip(axes, values, strict=True):
-        changes = _join(changes, axis.changes(value))
-    return changes
+def joined(changes: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """Several nested changes as one; of two for the same setting the later."""
+    result: dict[str, Any] = {}
+    for change in changes:
+        result = _join(result, change)
+    return result
 
 
 def nested(field: str, value: object) -> dict[str, Any]:
@@ -153,59 +193,38 @@ def nested(field: str, value: object) -> dict[str, Any]:
     return result
 
 
-def parse_axis(name: str, text: str) -> AxisCfg:
-    """An axis from a flag: `low:high:count` is a grid, `low:high` a distribution, `a,b,c` or one value a list.
+def axis_kind(episode: type[AnyEpisodeCfg], name: str) -> type[AxisValue]:
+    """The type of the values of an axis: that of the setting that it varies.
+
+    Args:
+        episode: configuration of the station's episodes.
+        name: short name or dotted setting.
 
     Raises:
-        ConfigError: text that is none of these.
+        ConfigError: no such setting, or one that is a table or a list.
     """
-    remedy = "low:high:count, low:high, or values with commas between them"
-    parts = text.split(":")
-    if len(parts) == 1 or name in _NAMED:
-        return AxisCfg(name, tuple(_value(part.strip(), name, remedy) for part in text.split(",")))
-    if len(parts) > 3:
-        raise ConfigError(name, text, remedy)
-    try:
-        low, high = float(parts[0]), float(parts[1])
-        count = int(parts[2]) if len(parts) == 3 else 0
-    except ValueError as error:
-        raise ConfigError(name, text, remedy) from error
-    if len(parts) == 3 and low == high and count == 1:
-        return AxisCfg(name, (low,))
-    if len(parts) == 3 and count < 2:
-        raise ConfigError(name, text, "a count of 2 or more")
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ConfigError(name, text, "finite numbers with low below high")
-    return AxisCfg(name, low=low, high=high, count=count)
-
-
-def _value(text: str, name: str, remedy: str) -> AxisValue:
-    if not text:
-        raise ConfigError(name, text, remedy)
-    if text in ("true", "false"):
-        return text == "true"
     if name == "level":
-        try:
-            return int(text)
-        except ValueError as error:
-            raise ConfigError(name, text, "whole numbers of 0 to 4") from error
-    try:
-        number = float(text)
-    except ValueError:
-        return text
-    if not math.isfinite(number):
-        raise ConfigError(name, text, "finite numbers")
-    return number
+        return int
+    if "." not in name and name not in ALIASES:
+        near = get_close_matches(name, ALIASES, n=1)
+        known = f"the axis {near[0]!r}" if near else f"one of {', '.join(ALIASES)}"
+        raise ConfigError(name, name, f"{known}, or a dotted setting such as world.start.heading_deg")
+    hint = setting_type(episode, ALIASES.get(name, (name,))[0])
+    options = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    for kind in KIND_WORDS:
+        if kind in options:
+            return kind
+    raise ConfigError(name, name, "a setting that is one number, one text or one truth value")
 
 
 def _kind(value: AxisValue) -> type[AxisValue]:
     return float if isinstance(value, int) and not isinstance(value, bool) else type(value)
 
 
-def _join(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+def _join(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
     """Deep union of two nested mappings."""
-    joined = dict(one)
+    union = dict(one)
     for key, value in other.items():
-        both = isinstance(value, dict) and isinstance(joined.get(key), dict)
-        joined[key] = _join(joined[key], value) if both else value
-    return joined
+        both = isinstance(value, dict) and isinstance(union.get(key), dict)
+        union[key] = _join(union[key], value) if both else value
+    return union

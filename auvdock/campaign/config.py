@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
-from pathlib import Path
 from typing import Any
 
-from auvdock.campaign.axes import AxisCfg, AxisValue, joint_changes
-from auvdock.core.errors import ConfigError
-from auvdock.core.strict import from_mapping, load_toml
+from auvdock.campaign.axes import WATER_AXES, AxisCfg, AxisValue, axis_kind, joined
+from auvdock.core.errors import ConfigError, located
+from auvdock.core.strict import from_mapping
 from auvdock.episode.config import LEVELS, AnyEpisodeCfg, landing_level_cfg, level_cfg
 
-__all__ = ["SAMPLINGS", "STATIONS", "CampaignCfg", "campaign_from_plain", "load_campaign"]
+__all__ = ["SAMPLINGS", "STATIONS", "CampaignCfg", "campaign_from_plain"]
 
 SAMPLINGS = ("random", "latin_hypercube", "sobol")
 """How axes that are distributions are drawn."""
@@ -54,6 +53,8 @@ class CampaignCfg:
     """What varies. Grid axes are crossed with each other; drawn axes are drawn anew for each episode."""
     episode: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """Changes of the level's settings that all episodes share, nested as in an episode's TOML file."""
+    waters: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """Waters of one's own by the names that an axis gives them, each with the content of its file."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run, before anything is run."""
@@ -74,13 +75,13 @@ class CampaignCfg:
         if len(set(names)) != len(names):
             raise ConfigError("axes", names, "each axis once")
         base = self.base(self.level)
-        ends = [axis.grid or (axis.quantile(0.0), axis.quantile(1.0)) for axis in self.axes]
+        ends = [axis.grid or tuple(axis.drawn(end, self.kind(axis)) for end in (0.0, 1.0)) for axis in self.axes]
         for axis, values in zip(self.axes, ends, strict=True):
             for value in values:
                 if axis.name == "level" and value not in LEVELS:
-                    raise ConfigError("axes.level", value, f"one of {', '.join(map(str, LEVELS))}")
+                    raise ConfigError("level", value, f"one of {', '.join(map(str, LEVELS))}")
         for point in _points(ends):
-            base.override(joint_changes(self.axes, point))
+            base.override(self.changes_at(point))
 
     @property
     def wall_limit_s(self) -> float:
@@ -98,7 +99,35 @@ class CampaignCfg:
         Raises:
             ConfigError: no such level, or changes that do not fit.
         """
-        return STATIONS[self.station](level).override(self.episode)
+        plain = STATIONS[self.station](level)
+        with located("episode."):
+            return plain.override(self.episode)
+
+    def kind(self, axis: AxisCfg) -> type[AxisValue]:
+        """The type of an axis' values in configurations and rows.
+
+        Raises:
+            ConfigError: no such setting.
+        """
+        return axis_kind(type(STATIONS[self.station](self.level)), axis.name)
+
+    def changes(self, axis: AxisCfg, value: AxisValue) -> dict[str, Any]:
+        """The nested change of an episode's configuration that a value of an axis stands for.
+
+        Raises:
+            ConfigError: a value that is not of the setting's type.
+        """
+        if axis.name in WATER_AXES and value in self.waters:
+            return {"world": {"water": self.waters[str(value)]}}
+        return axis.changes(axis.typed(value, self.kind(axis)))
+
+    def changes_at(self, point: Sequence[AxisValue]) -> dict[str, Any]:
+        """What a value of each axis changes together: some fit only beside one another.
+
+        Raises:
+            ConfigError: a value that is not of its setting's type.
+        """
+        return joined(self.changes(axis, value) for axis, value in zip(self.axes, point, strict=True))
 
 
 def _points(ends: Sequence[Sequence[AxisValue]]) -> Iterable[tuple[AxisValue, ...]]:
@@ -108,15 +137,6 @@ def _points(ends: Sequence[Sequence[AxisValue]]) -> Iterable[tuple[AxisValue, ..
     if 1 < len(ends) <= _MOST_CORNERED:
         points += product(*((values[0], values[-1]) for values in ends))
     return dict.fromkeys(points)
-
-
-def load_campaign(path: Path) -> CampaignCfg:
-    """Read a campaign's TOML file.
-
-    Raises:
-        ConfigError: the file cannot be read, has an unknown key or a value that does not fit.
-    """
-    return load_toml(CampaignCfg, path)
 
 
 def campaign_from_plain(data: Mapping[str, Any]) -> CampaignCfg:

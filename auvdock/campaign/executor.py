@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import resource
 import signal
+import sys
 import threading
 from collections.abc import Iterable, Iterator
+from importlib import import_module
 from types import FrameType
-from typing import Protocol
+from typing import Any, Protocol
 
 from auvdock.campaign.job import EpisodeFunction, Job, attempt
 from auvdock.campaign.plan import EpisodeSpec
@@ -47,13 +48,20 @@ class Executor(Protocol):
 
 def peak_rss_mb() -> float:
     """Peak resident memory of this process so far, MiB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    try:
+        resource: Any = import_module("resource")
+    except ImportError:  # Windows
+        psutil: Any = import_module("psutil")
+        return psutil.Process().memory_info().peak_wset / 2.0**20
+    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    return peak / (2.0**20 if sys.platform == "darwin" else 2.0**10)  # bytes there, KiB elsewhere
 
 
 class SerialExecutor:
     """One episode after the other in the calling process; for debugging and as the reference for the others.
 
-    The time limit works by an alarm signal, so only in the main thread and only between Python instructions.
+    The time limit works by an alarm signal, so only in the main thread, only between Python instructions, and not on
+    Windows, which has none.
     """
 
     def __init__(self, limit_s: float) -> None:
@@ -93,7 +101,7 @@ class SerialExecutor:
     def _timed(self, spec: EpisodeSpec) -> Row:
         if self._run is None or self._job is None:
             raise RuntimeError("start comes before run")
-        if threading.current_thread() is not threading.main_thread():
+        if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
             return attempt(self._run, spec)
         before = signal.signal(signal.SIGALRM, _raise_overtime)
         signal.setitimer(signal.ITIMER_REAL, self._limit_s)

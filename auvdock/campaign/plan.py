@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from auvdock.campaign.axes import AxisValue, joint_changes
+from auvdock.campaign.axes import AxisValue
 from auvdock.campaign.config import CampaignCfg
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
@@ -52,7 +52,8 @@ class Plan:
         self.cfg = cfg
         self._grid = [axis for axis in cfg.axes if axis.is_grid]
         self._drawn = [axis for axis in cfg.axes if not axis.is_grid]
-        self._grids = [axis.grid for axis in self._grid]
+        self._kinds = {axis.name: cfg.kind(axis) for axis in cfg.axes}
+        self._grids = [tuple(axis.typed(value, self._kinds[axis.name]) for value in axis.grid) for axis in self._grid]
         self.cells = math.prod(len(values) for values in self._grids)
         self._design = self._draw_design()
 
@@ -79,14 +80,14 @@ class Plan:
             unit = np.random.default_rng(sequence).random(len(self._drawn))
             unit = unit if self._design is None else self._design[episode]
             for axis, probability in zip(self._drawn, unit, strict=True):
-                point[axis.name] = axis.quantile(float(probability))
+                point[axis.name] = axis.drawn(float(probability), self._kinds[axis.name])
         return EpisodeSpec(episode, seed, {axis.name: point[axis.name] for axis in self.cfg.axes})
 
     def config(self, spec: EpisodeSpec) -> AnyEpisodeCfg:
         """The episode's configuration."""
         level = spec.point.get("level", self.cfg.level)
-        values = [spec.point[axis.name] for axis in self.cfg.axes]
-        return self.cfg.base(int(level)).override(joint_changes(self.cfg.axes, values))
+        point = [spec.point[axis.name] for axis in self.cfg.axes]
+        return self.cfg.base(int(level)).override(self.cfg.changes_at(point))
 
     def _draw_design(self) -> Array | None:
         if not self._drawn or self.cfg.sampling == "random":

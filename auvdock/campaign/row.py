@@ -35,7 +35,7 @@ RESULT_COLUMNS: Mapping[str, type] = _result_columns()
 
 def columns(cfg: CampaignCfg) -> dict[str, type]:
     """All columns of a campaign's rows, in order: key, seed, axes, result, and what went wrong with a lost episode."""
-    axes: dict[str, type] = {axis.name: axis.kind for axis in cfg.axes}
+    axes: dict[str, type] = {axis.name: cfg.kind(axis) for axis in cfg.axes}
     return {"episode": int, "seed": int, **axes, **RESULT_COLUMNS, "error": str}
 
 

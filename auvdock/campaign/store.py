@@ -7,7 +7,6 @@ death between the two leaves rows in both, which reading takes once.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections.abc import Iterable
@@ -22,6 +21,7 @@ import pyarrow.parquet as pq
 from auvdock.campaign.config import CampaignCfg, campaign_from_plain
 from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.journal import Journal, read_journal, readable_errors
+from auvdock.campaign.lock import FolderLock
 from auvdock.campaign.row import Row, columns
 from auvdock.core.errors import ConfigError
 
@@ -29,7 +29,6 @@ __all__ = ["Store", "read_manifest", "read_table"]
 
 MANIFEST = "manifest.json"
 JOURNAL = "journal.jsonl"
-LOCK = ".lock"
 TEMPORARY = ".tmp-"
 SHARDS = "rows-*.parquet"
 FORMAT = 1
@@ -105,9 +104,8 @@ class Store:
         self._shard_rows = max(100, cfg.episodes // 100)
         with readable_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        self._lock = FolderLock(folder)
         try:
-            self._take_lock()
             sessions: list[Any] = []
             if (folder / MANIFEST).exists():
                 if not resume:
@@ -132,7 +130,7 @@ class Store:
             else:
                 self._journal.empty()
         except BaseException:
-            os.close(self._lock)
+            self._lock.release()
             raise
 
     def add(self, row: Row) -> None:
@@ -159,7 +157,7 @@ class Store:
             try:
                 pq.write_table(pa.Table.from_pylist(ordered, self._schema), temporary)
                 _sync(temporary)
-                temporary.rename(self.folder / name)
+                temporary.replace(self.folder / name)
                 _sync(self.folder)
             except OSError:
                 with suppress(OSError):
@@ -178,21 +176,14 @@ class Store:
     def abandon(self) -> None:
         """Give the folder free as it is; the journal keeps what is in no shard."""
         self._journal.close()
-        with suppress(OSError):
-            os.close(self._lock)
-
-    def _take_lock(self) -> None:
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise CampaignError(f"{self.folder}: another sweep is writing there; wait for it") from error
+        self._lock.release()
 
     def _write_manifest(self, manifest: dict[str, Any]) -> None:
         temporary = self.folder / f"{TEMPORARY}{MANIFEST}"
         with readable_errors(self.folder):
             temporary.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
             _sync(temporary)
-            temporary.rename(self.folder / MANIFEST)
+            temporary.replace(self.folder / MANIFEST)
 
     def _in_shards(self) -> set[int]:
         found: set[int] = set()
@@ -223,7 +214,7 @@ def _without(rows: Iterable[Row], episodes: set[int]) -> list[Row]:
 
 
 def _check_same(there: CampaignCfg, wanted: CampaignCfg) -> None:
-    for name in ("station", "seed", "axes", "sampling", "level", "episode"):
+    for name in ("station", "seed", "axes", "sampling", "level", "episode", "waters"):
         if getattr(there, name) != getattr(wanted, name):
             raise ConfigError(
                 name, getattr(wanted, name), f"{getattr(there, name)!r} as the campaign has it, to resume"
@@ -238,6 +229,8 @@ def _software(session: dict[str, Any]) -> tuple[object, object]:
 
 
 def _sync(path: Path) -> None:
+    if os.name == "nt" and path.is_dir():  # Windows writes a folder's entries through, and opens no folder
+        return
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import warnings
 from contextlib import suppress
-from multiprocessing import parent_process
+from multiprocessing import current_process, parent_process
 from multiprocessing.connection import Connection, wait
 
 import cv2
 
 from auvdock.campaign.executor import peak_rss_mb
 from auvdock.campaign.job import Job, attempt
-from auvdock.core.errors import AuvdockError
+from auvdock.core.errors import AuvdockError, AuvdockWarning
 from auvdock.core.memory import relax_collector
 
 __all__ = ["READY", "THREAD_LIMITS", "work"]
@@ -39,6 +40,8 @@ def work(connection: Connection, job: Job) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_die_with_parent, daemon=True).start()
     cv2.setNumThreads(1)
+    if not current_process().name.endswith("-0"):  # all have the same machine to tell of; one is enough
+        warnings.simplefilter("ignore", AuvdockWarning)
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the parent has gone
         try:
             run = job.build()

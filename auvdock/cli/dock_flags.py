@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,6 +15,7 @@ import tyro
 from auvdock.core.errors import ConfigError, GraphicsError
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.optics.gl import probe_gl
+from auvdock.sim.mj import GL_REFUSAL
 
 __all__ = ["DockFlags"]
 
@@ -32,7 +34,7 @@ class DockFlags(ABC):
     controller: str | None = None
     """A pilot of your own as package.module:Name, in place of the station's."""
     water: str | None = None
-    """Water preset: I, IA, IB, II, III, 1C to 9C, clear, pool, lake."""
+    """Water preset (I, IA, IB, II, III, 1C to 9C, clear, pool, lake), or a TOML file written as assets/waters are."""
     attenuation: float | None = None
     """Beam attenuation at 450 nm in 1/m, in place of the preset's."""
     current: float | None = None
@@ -43,6 +45,8 @@ class DockFlags(ABC):
     """Difficulty 0 to 4; the flags change single things of it."""
     config: Path | None = None
     """TOML file with further settings, on top of the level."""
+    station: str | None = None
+    """TOML file of a station in place of the level's, written as assets/stations are; `auvdock plan` writes such."""
     record: Path | None = None
     """Write a Rerun recording here."""
     json: bool = False
@@ -71,10 +75,9 @@ class DockFlags(ABC):
         if self.water is not None:
             world["water"] = self.water
         if self.attenuation is not None:
-            world["attenuation_per_m"] = _finite("attenuation", self.attenuation, "a finite attenuation in 1/m")
+            world["attenuation_per_m"] = self.attenuation
         if self.current is not None:
-            speed = _finite("current", self.current, "a finite speed in m/s")
-            world.setdefault("sim", {}).setdefault("current", {})["speed_m_s"] = speed
+            world.setdefault("sim", {}).setdefault("current", {})["speed_m_s"] = self.current
         if self.current_direction is not None:
             start = world.setdefault("start", {})
             start["random_current_direction"] = self.current_direction == "random"
@@ -92,19 +95,14 @@ def _working_fidelity() -> str:
     try:
         probe_gl()
     except GraphicsError as error:
-        print(f"auvdock: {error}", file=sys.stderr)
+        if GL_REFUSAL is None:  # of which every command tells
+            print(f"auvdock: {error}", file=sys.stderr)
         return "beacons"
     return "pixels"
 
 
-def _finite(name: str, value: float, remedy: str) -> float:
-    if not math.isfinite(value):
-        raise ConfigError(name, value, remedy)
-    return value
-
-
 def _degrees(text: str) -> float:
-    try:
-        return _finite("current-direction", float(text), "degrees or 'random'")
-    except ValueError as error:
-        raise ConfigError("current-direction", text, "degrees or 'random'") from error
+    with suppress(ValueError):
+        if math.isfinite(degrees := float(text)):
+            return degrees
+    raise ConfigError("current-direction", text, "degrees or 'random'")

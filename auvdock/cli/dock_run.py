@@ -14,7 +14,7 @@ from auvdock.campaign.replay import StoredEpisode, stored_episode
 from auvdock.campaign.row import differences, row_of
 from auvdock.cli.display import ProgressDisplay, print_result
 from auvdock.cli.dock_flags import DockFlags
-from auvdock.cli.parsing import base_config, parse
+from auvdock.cli.parsing import base_config, parse, station_file, with_station
 from auvdock.core.errors import ConfigError
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
@@ -71,9 +71,13 @@ def _stored(argv: Sequence[str], station: str) -> StoredEpisode | None:
 
 
 def _defaults(command: type[DockFlags], argv: Sequence[str], stored: StoredEpisode | None, station: str) -> DockFlags:
-    if stored is not None:
-        return replace(command(), seed=stored.spec.seed, episode=stored.cfg)
-    return command() if {"-h", "--help"} & set(argv) else replace(command(), episode=base_config(argv, station))
+    if stored is None and {"-h", "--help"} & set(argv):
+        return command()
+    cfg = stored.cfg if stored is not None else base_config(argv, station)
+    own = station_file(argv)
+    if own is not None:
+        cfg = with_station(cfg, own)
+    return replace(command(), seed=stored.spec.seed if stored is not None else command().seed, episode=cfg)
 
 
 def _fly(

@@ -10,19 +10,30 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
 from rich.console import Console
 from rich.table import Table
 
 from auvdock.cli.parsing import parse
-from auvdock.core.compiled import cache_folder
+from auvdock.core.compiled import cache_folders
 from auvdock.core.errors import AuvdockError
-from auvdock.perception.components import components
+from auvdock.core.kept_code import examine_folder
 
 __all__ = ["Check", "Doctor", "examine", "run"]
 
-PACKAGES = ("mujoco", "gymnasium", "numpy", "scipy", "opencv-python-headless", "onnxruntime", "control", "numba")
+PACKAGES = (
+    "mujoco",
+    "gymnasium",
+    "numpy",
+    "scipy",
+    "opencv-python-headless",
+    "onnxruntime",
+    "control",
+    "numba",
+    "filelock",
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +66,7 @@ def run(argv: Sequence[str], prog: str) -> int:
         for column in ("part", "state", "detail", "remedy"):
             table.add_column(column)
         for check in checks:
-            state = "[green]ok[/green]" if check.ok else ("[red]missing[/red]" if check.required else "absent")
+            state = "[green]ok[/green]" if check.ok else ("[red]missing[/red]" if check.required else "not ok")
             table.add_row(check.name, state, check.detail, check.remedy)
         Console().print(table)
     return 1 if any(check.required and not check.ok for check in checks) else 0
@@ -105,9 +116,42 @@ def _onnx() -> str:
 
 
 def _compiled_loops() -> Check:
-    folder = cache_folder(components)
-    remedy = "" if folder else "they are compiled anew in every process, up to a minute: set NUMBA_CACHE_DIR"
-    return Check("compiled loops", folder is not None, False, f"kept in {folder}" if folder else "not kept", remedy)
+    """Read all that is kept of what an episode needs, and write to where the rest would go."""
+    try:
+        import_module("auvdock.episode.runner")  # loads what an episode needs
+    except ImportError as error:
+        return Check("compiled loops", False, False, f"not loaded ({error})")
+    modules = [module for name, module in sys.modules.items() if name.startswith("auvdock.")]
+    places = {cache_folders(value) for module in modules for value in vars(module).values()} - {()}
+    whole = damaged = bare = 0
+    used: list[str] = []
+    closed: list[str] = []
+    spoiled: list[str] = []
+    for folders in sorted(places):
+        why, before = "", whole
+        for folder in folders:
+            state = examine_folder(folder)
+            whole, damaged = whole + state.whole, damaged + state.damaged
+            used += [str(folder)] * (state.whole > 0)
+            spoiled += [str(folder)] * (state.damaged > 0)
+            if state.unwritable is None:
+                break
+            why = why or f"{folder}: {state.unwritable}"
+        else:
+            closed.append(why)
+            bare += whole == before
+    detail = f"{whole} kept under {os.path.commonpath(used)}" if whole else "none kept yet, the first run compiles them"
+    remedies: list[str] = []
+    if damaged:
+        detail += f", {damaged} damaged in {', '.join(spoiled)}"
+        remedies.append("what is damaged is left aside and compiled anew when needed; or delete it")
+    if closed:
+        detail += f"; nothing more can be kept ({closed[0]})"
+        remedies.append(
+            "what is missing is compiled in every process, up to a minute: make room or set NUMBA_CACHE_DIR"
+        )
+    # Full folders that cannot be written are as good as any: a read-only installation.
+    return Check("compiled loops", not damaged and not bare, False, detail, "; ".join(remedies))
 
 
 def _viewer() -> Check:

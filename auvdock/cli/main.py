@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from importlib import import_module
 
+from auvdock.cli.notices import told_once, unusable_gl
 from auvdock.core.errors import AuvdockError
 from auvdock.core.memory import relax_collector
 
@@ -49,6 +51,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.landing_trials:run_landing_trials",
         "paper C's ten landings beside ours, each level alone and both",
     ),
+    ("reproduce", "halo"): (
+        "auvdock.cli.reproduce_halo:run_halo",
+        "the light about a lamp against single photons",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("fit-landing",): (
@@ -74,10 +80,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         module, function = COMMANDS[command][0].split(":")
         run: Callable[[Sequence[str], str], int] = getattr(import_module(module), function)
         relax_collector()
+        _find_modules_here()
         from auvdock.core.compiled import compiling  # half a second, not for a usage message
 
-        with nullcontext() if "--json" in words else compiling(_tell_of_compiling):
-            return run(words[len(command) :], "auvdock " + " ".join(command))
+        with told_once(), nullcontext() if "--json" in words else compiling(_tell_of_compiling):
+            code = run(words[len(command) :], "auvdock " + " ".join(command))
+        unusable_gl()
+        return code
     except AuvdockError as error:
         print(f"auvdock: error: {error}", file=sys.stderr)
         return 2
@@ -87,6 +96,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 141
+
+
+def _find_modules_here() -> None:
+    """Let detectors and pilots of one's own be found in the current folder, in worker processes too.
+
+    After everything else: a file there must not stand in for a module of the same name that something here needs.
+    """
+    with suppress(OSError):  # the folder may be gone
+        if (here := os.getcwd()) not in sys.path:
+            sys.path.append(here)
 
 
 def _tell_of_compiling() -> None:

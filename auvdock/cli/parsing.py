@@ -1,20 +1,34 @@
-"""Parsing of flags: tyro over frozen dataclasses, with a level or a TOML file as the defaults beneath the flags."""
+"""Parsing of flags: tyro over frozen dataclasses, with a level or a TOML file as the defaults beneath the flags.
+
+tyro makes the dataclasses from within and would run their checks where nobody knows which flags they came from. So it
+fills them unchecked, and `auvdock.core.strict.recheck` makes them anew, with each error under its full path.
+"""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
+from tyro.constructors import (
+    ConstructorRegistry,
+    PrimitiveConstructorSpec,
+    PrimitiveTypeInfo,
+    StructConstructorSpec,
+    StructTypeInfo,
+)
 
 from auvdock.campaign.config import STATIONS
 from auvdock.core.errors import ConfigError
-from auvdock.core.strict import read_toml
+from auvdock.core.strict import names_file, read_toml, recheck
 from auvdock.episode.config import AnyEpisodeCfg
+from auvdock.optics.water import WaterCfg, load_water
 
-__all__ = ["DEFAULT_LEVEL", "base_config", "level_and_file", "parse"]
+__all__ = ["DEFAULT_LEVEL", "base_config", "level_and_file", "parse", "station_file", "with_station"]
 
 T = TypeVar("T")
 
@@ -23,13 +37,65 @@ DEFAULT_LEVEL = 1
 
 
 def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None) -> T:
-    """Fill the dataclass `cls` from flags; wrong flags end the program with exit code 2, as argparse's do."""
+    """Fill the dataclass `cls` from flags; wrong flags end the program with exit code 2, as argparse's do.
+
+    Raises:
+        ConfigError: a value that its field's dataclass refuses, or that is no finite number.
+    """
     doc = (cls.__doc__ or "").strip()
     # What a configuration may leave out (a rotating beacon) shall give flags where it is there, never subcommands.
     config = (tyro.conf.AvoidSubcommands,)
-    if default is None:
-        return tyro.cli(cls, args=list(argv), prog=prog, description=doc, config=config)
-    return tyro.cli(cls, args=list(argv), prog=prog, description=doc, default=default, config=config)
+    read = partial(tyro.cli, cls, args=list(argv), prog=prog, description=doc, config=config, registry=_registry())
+    given: T = read() if default is None else read(default=default)
+    try:
+        return recheck(given)
+    except ConfigError as error:
+        # An episode's settings are flags of their own, without its name before them; other flags have dashes.
+        setting = error.field.removeprefix("episode.")
+        name = setting if "." in setting else setting.replace("_", "-")
+        raise ConfigError(name, error.value, error.remedy) from error
+
+
+def _registry() -> ConstructorRegistry:
+    """How flags become values where tyro's own way does not serve."""
+    registry = ConstructorRegistry()
+    asked: list[StructTypeInfo] = []
+
+    @registry.struct_rule
+    def unchecked(info: StructTypeInfo) -> StructConstructorSpec | None:
+        """Tyro's own rule for dataclasses, but that nothing is checked yet."""
+        if asked or not dataclasses.is_dataclass(info.type):
+            return None
+        asked.append(info)  # the rules below this one are asked, not this one again
+        try:
+            spec = ConstructorRegistry.get_struct_spec(info)
+        finally:
+            asked.clear()
+        if not isinstance(spec, StructConstructorSpec):
+            return None
+        return dataclasses.replace(spec, instantiate=partial(_unchecked, info.type))
+
+    @registry.primitive_rule
+    def water(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[str | WaterCfg] | None:
+        """A water by name or file, never by its coefficients."""
+        if info.type != str | WaterCfg:
+            return None
+        return PrimitiveConstructorSpec(
+            nargs=1,
+            metavar="NAME|FILE",
+            instance_from_str=lambda words: load_water(words[0]) if names_file(words[0]) else words[0],
+            is_instance=lambda value: isinstance(value, str | WaterCfg),
+            str_from_instance=lambda value: [value.name if isinstance(value, WaterCfg) else value],
+        )
+
+    return registry
+
+
+def _unchecked(cls: type, **values: Any) -> object:  # noqa: ANN401 - whatever fields there are
+    made = object.__new__(cls)
+    for name, value in values.items():
+        object.__setattr__(made, name, value)
+    return made
 
 
 def base_config(argv: Sequence[str], station: str) -> AnyEpisodeCfg:
@@ -62,3 +128,21 @@ def level_and_file(argv: Sequence[str]) -> tuple[int, Path | None]:
     except ValueError as error:
         raise ConfigError("level", found.level, "a whole number of 0 to 4") from error
     return level, Path(found.config) if found.config else None
+
+
+def station_file(argv: Sequence[str]) -> str | None:
+    """What `--station FILE` says."""
+    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    finder.add_argument("--station", default=None)
+    return finder.parse_known_args(list(argv))[0].station
+
+
+def with_station(cfg: AnyEpisodeCfg, file: str) -> AnyEpisodeCfg:
+    """The configuration with the station of a TOML file.
+
+    Raises:
+        ConfigError: a file that cannot be read, or that describes another kind of station.
+    """
+    if not names_file(file):
+        raise ConfigError("station", file, "a station's file, NAME.toml")
+    return cfg.override({"world": {"station": file}})

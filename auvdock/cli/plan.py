@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -45,7 +46,7 @@ class Plan:
     station: Annotated[Path, tyro.conf.Positional]
     """TOML file of a conical station, as assets/stations/conical.toml."""
     water: str = "pool"
-    """Water preset: I, IA, IB, II, III, 1C to 9C, clear, pool, lake."""
+    """Water preset (I, IA, IB, II, III, 1C to 9C, clear, pool, lake), or a TOML file written as assets/waters are."""
     attenuation: float | None = None
     """Beam attenuation at 450 nm in 1/m, in place of the preset's."""
     min_lights: int = 4
@@ -96,6 +97,7 @@ def run(argv: Sequence[str], prog: str) -> int:
         files: list[str] = []
         spaces = {"station": space}
         optimised: dict[str, Any] | None = None
+        flown = args.station
         if search is not None:
             rng = np.random.default_rng(args.seed)
             found = optimise_physical(layout, search, cfg, rng, lambda: progress.advance(task))
@@ -103,7 +105,8 @@ def run(argv: Sequence[str], prog: str) -> int:
             spaces["optimised"] = guidance_space(best, cfg)
             optimised = _optimised(search, found, spaces["optimised"])
             if args.out is not None:
-                write_station(args.out / "optimised.toml", with_lights(station, best))
+                flown = args.out / "optimised.toml"
+                write_station(flown, with_lights(station, best))
                 files.append("optimised.toml")
         if args.out is not None:
             title = f"{args.station.stem} in {args.water}: {space.volume_m3:.0f} m³"
@@ -117,11 +120,21 @@ def run(argv: Sequence[str], prog: str) -> int:
             files.append("sweeps.png")
     report = _report(args, space, region_s, points, files)
     report["optimised"] = optimised
+    report["fly_it"] = _flying(args, station, flown)
     if args.json:
         print(json.dumps(report, allow_nan=False))
     else:
         _print(report, points)
     return 0
+
+
+def _flying(args: Plan, station: ConicalStationCfg, file: Path) -> str:
+    """The command that docks into the planned station."""
+    kind = "conical" if station.rotating is None else "rotating"
+    words = ["auvdock", "dock", kind, "--station", str(file), "--water", args.water]
+    if args.attenuation is not None:
+        words += ["--attenuation", f"{args.attenuation:g}"]
+    return shlex.join(words)
 
 
 def section_panels(
@@ -265,6 +278,7 @@ def _print(report: dict[str, Any], points: list[SweepPoint]) -> None:
         console.print(table)
     for name in report["files"]:
         console.print(name, highlight=False)
+    print(f"fly it: {report['fly_it']}")  # as it is, in one line: to be copied
 
 
 def _print_optimised(console: Console, report: dict[str, Any]) -> None:

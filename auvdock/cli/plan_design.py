@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -88,11 +89,15 @@ def run_guidance_design(argv: Sequence[str], prog: str) -> int:
                 campaigns.append(dock_campaign(name, station, args.water, args.episodes, workers=args.workers))
                 progress.advance(third)
     files: list[str] = []
+    fly_it: str | None = None
     if args.out is not None:
         draw_comparison(args.out / "guidance_design.png", physical, paper)
-        write_station(args.out / f"optimised_{args.water}.toml", physical.station)
-        files = [str(args.out / name) for name in ("guidance_design.png", f"optimised_{args.water}.toml")]
+        station_file = args.out / f"optimised_{Path(args.water).stem}.toml"
+        write_station(station_file, physical.station)
+        files = [str(args.out / "guidance_design.png"), str(station_file)]
+        fly_it = shlex.join(["auvdock", "dock", "conical", "--station", str(station_file), "--water", args.water])
     report = _report(paper, physical, campaigns, files, args.cone)
+    report["fly_it"] = fly_it
     if args.json:
         print(json.dumps(report, allow_nan=False))
     else:
@@ -164,3 +169,5 @@ def _print(report: dict[str, Any]) -> None:
         console.print(table)
     for name in report["files"]:
         console.print(name, highlight=False)
+    if report["fly_it"] is not None:
+        print(f"fly it: {report['fly_it']}")

@@ -16,19 +16,21 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from auvdock.campaign.axes import AxisCfg, parse_axis
+from auvdock.campaign.axes import AxisCfg, axis_kind
+from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.campaign import CampaignSummary, run_campaign
-from auvdock.campaign.config import STATIONS, CampaignCfg, load_campaign
+from auvdock.campaign.config import STATIONS, CampaignCfg
 from auvdock.campaign.executor import Executor, SerialExecutor
+from auvdock.campaign.files import keep_files, load_campaign, station_kind
 from auvdock.campaign.job import DockingJob
 from auvdock.campaign.plan import Plan
 from auvdock.campaign.process import ProcessExecutor, usable_cores
 from auvdock.campaign.provenance import manifest_of
 from auvdock.campaign.store import Store, read_campaign
-from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, parse
+from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, parse, station_file, with_station
 from auvdock.cli.sweep_progress import SweepProgress
 from auvdock.core.errors import ConfigError
-from auvdock.core.strict import read_toml, to_plain
+from auvdock.core.strict import names_file, read_toml, to_plain
 from auvdock.episode.config import AnyEpisodeCfg, EpisodeCfg, LandingEpisodeCfg
 
 __all__ = ["Sweep", "plain_summary", "print_summary", "run"]
@@ -64,8 +66,9 @@ class SweepFlags:
     """Folder of the campaign: manifest, rows as Parquet shards, later the report."""
     campaign: Path | None = None
     """Campaign as a TOML file (see experiments/campaigns); the flags below change single things of it."""
-    station: Literal["conical", "rotating", "landing"] | None = None
-    """Docking station (conical if no campaign file says otherwise)."""
+    station: str | None = None
+    """Docking station: conical, rotating, landing, or the TOML file of one (conical if no campaign file says
+    otherwise)."""
     episodes: int | None = None
     """Number of episodes (100 if no campaign file says otherwise)."""
     seed: int | None = None
@@ -102,7 +105,7 @@ class SweepFlags:
     gust: str | None = None
     """Standard deviation of the gusts in m/s: value or range."""
     water: str | None = None
-    """Water preset, or several with commas."""
+    """Water preset or a TOML file of one's own, or several with commas."""
     flicker: str | None = None
     """Flicker of the lamps: none, mild, moderate, severe, or several with commas."""
     interfering_lights: str | None = None
@@ -116,24 +119,24 @@ class SweepFlags:
     config: Path | None = None
     """TOML file with further settings of the episodes, on top of the level."""
 
-    def axes(self) -> list[AxisCfg]:
-        """The axes that the flags ask for.
+    def axes(self, episode: type[AnyEpisodeCfg]) -> list[AxisCfg]:
+        """The axes that the flags ask for, in episodes of a configuration.
 
         Raises:
-            ConfigError: a range that cannot be read.
+            ConfigError: a range that cannot be read, or an axis that such episodes do not have.
         """
         found: list[AxisCfg] = []
         for name in AXIS_FLAGS:
             text = getattr(self, name)
             if text is not None and text != "random":
-                found.append(parse_axis(name, text))
+                found.append(parse_axis(name, text, axis_kind(episode, name)))
         for text in self.axis:
             name, equals, values = text.partition("=")
             if not equals:
                 raise ConfigError("axis", text, "NAME=RANGE, for example world.start.heading_deg=0:60:4")
-            found.append(parse_axis(name, values))
+            found.append(parse_axis(name, values, axis_kind(episode, name)))
         if self.level is not None and "," in self.level:
-            found.append(parse_axis("level", self.level))
+            found.append(parse_axis("level", self.level, int))
         return found
 
 
@@ -186,8 +189,10 @@ def _station(argv: Sequence[str]) -> str:
         finder.add_argument(flag, default=None)
     finder.add_argument("--resume", action="store_true")
     found, _ = finder.parse_known_args(list(argv))
-    if found.station in STATIONS:
-        return found.station
+    if found.station is not None:
+        if found.station not in STATIONS and not names_file(found.station):
+            raise ConfigError("station", found.station, f"{', '.join(STATIONS)}, or the TOML file of one")
+        return found.station if found.station in STATIONS else station_kind(Path(found.station))
     if found.campaign is not None:
         return load_campaign(Path(found.campaign)).station
     if found.resume and found.out is not None:
@@ -202,7 +207,10 @@ def _base(argv: Sequence[str], station: str) -> AnyEpisodeCfg:
         return make(DEFAULT_LEVEL)
     level, file = level_and_file(_single_level(argv))
     cfg = make(level)
-    return cfg.override(read_toml(file)) if file is not None else cfg
+    if file is not None:
+        cfg = cfg.override(read_toml(file))
+    own = station_file(argv)
+    return with_station(cfg, own) if own not in (None, *STATIONS) else cfg
 
 
 def _single_level(argv: Sequence[str]) -> list[str]:
@@ -218,16 +226,20 @@ def _single_level(argv: Sequence[str]) -> list[str]:
 
 def _resolve(args: SweepFlags, episode: AnyEpisodeCfg, station: str) -> CampaignCfg:
     changes = _difference(to_plain(_start(args, station)), to_plain(episode))
-    axes = args.axes()
+    axes = args.axes(type(episode))
+    if args.station is not None and args.station not in STATIONS:
+        changes.setdefault("world", {})["station"] = to_plain(episode.world.station)
     if args.fidelity is not None:
         changes.setdefault("world", {})["fidelity"] = args.fidelity
     if args.current_direction == "random":
         changes.setdefault("world", {}).setdefault("start", {})["random_current_direction"] = True
     plain: dict[str, Any] = {
         name: getattr(args, name)
-        for name in ("station", "episodes", "seed", "until_ci", "sampling")
+        for name in ("episodes", "seed", "until_ci", "sampling")
         if getattr(args, name) is not None
     }
+    if args.station is not None:
+        plain["station"] = station
     if args.until_ci_per_cell:
         plain["until_ci_per_cell"] = True
     if args.episode_limit is not None:
@@ -238,10 +250,11 @@ def _resolve(args: SweepFlags, episode: AnyEpisodeCfg, station: str) -> Campaign
     if args.resume and not asked:
         return read_campaign(args.out)
     if args.campaign is None:
-        return CampaignCfg(**plain, axes=tuple(axes), episode=changes)
+        return keep_files(CampaignCfg(**plain, axes=tuple(axes), episode=changes))
     there = load_campaign(args.campaign)
     kept = [axis for axis in there.axes if axis.name not in {axis.name for axis in axes}]
-    return dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=_deep({**there.episode}, changes))
+    wanted = dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=_deep({**there.episode}, changes))
+    return keep_files(wanted)
 
 
 def _start(args: SweepFlags, station: str) -> AnyEpisodeCfg:

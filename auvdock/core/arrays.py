@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Array", "BoolArray", "Image", "IntArray", "check_shape"]
+__all__ = ["Array", "BoolArray", "Image", "IntArray", "ShapeError", "check_shape"]
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -13,11 +15,16 @@ IntArray = NDArray[np.int64]
 Image = NDArray[np.uint8]
 
 
-def check_shape(name: str, array: NDArray[np.generic], shape: tuple[int | None, ...]) -> None:
-    """Raise ValueError unless `array` has `shape`; None stands for any length."""
-    if array.shape == shape:
+class ShapeError(ValueError):
+    """An array of another shape than it must have."""
+
+
+def check_shape(name: str, array: Any, shape: tuple[int | None, ...]) -> None:  # noqa: ANN401 - that is the question
+    """Raise ShapeError unless `array` has `shape`; None stands for any length."""
+    have = getattr(array, "shape", None)
+    if have == shape:
         return  # the common case, at a tenth of the cost
-    if array.ndim != len(shape) or any(
-        want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
-    ):
-        raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
+    if have is None:
+        raise ShapeError(f"{name} is a {type(array).__name__}, expected an array of shape {shape}")
+    if len(have) != len(shape) or any(want not in (None, size) for size, want in zip(have, shape, strict=True)):
+        raise ShapeError(f"{name} has shape {have}, expected {shape}")

@@ -45,20 +45,19 @@ class BeaconCfg:
 
     def __post_init__(self) -> None:
         """Refuse what no lamp can be."""
-        where = f"beacons.{self.name}"
         if self.role not in ROLES:
-            raise ConfigError(f"{where}.role", self.role, f"one of {', '.join(ROLES)}")
+            raise ConfigError("role", self.role, f"one of {', '.join(ROLES)}")
         if not 380.0 <= self.wavelength_nm <= 720.0:
-            raise ConfigError(f"{where}.wavelength_nm", self.wavelength_nm, "a visible wavelength of 380 to 720 nm")
-        check_finite(f"{where}.position_m", self.position_m, "three finite coordinates")
-        check_finite(f"{where}.axis", self.axis, "three finite components")
-        check_above(f"{where}.power_w", self.power_w, 0.0, "a power above 0 W")
+            raise ConfigError("wavelength_nm", self.wavelength_nm, "a visible wavelength of 380 to 720 nm")
+        check_finite("position_m", self.position_m, "three finite coordinates")
+        check_finite("axis", self.axis, "three finite components")
+        check_above("power_w", self.power_w, 0.0, "a power above 0 W")
         if not 0.0 < self.efficiency <= 1.0:
-            raise ConfigError(f"{where}.efficiency", self.efficiency, "a fraction above 0 and up to 1")
+            raise ConfigError("efficiency", self.efficiency, "a fraction above 0 and up to 1")
         if not 0.5 <= self.beam_angle_deg <= 360.0:
-            raise ConfigError(f"{where}.beam_angle_deg", self.beam_angle_deg, "a full angle of 0.5 to 360 degrees")
+            raise ConfigError("beam_angle_deg", self.beam_angle_deg, "a full angle of 0.5 to 360 degrees")
         if not sum(part * part for part in self.axis) > 0.0:
-            raise ConfigError(f"{where}.axis", self.axis, "a direction of non-zero length")
+            raise ConfigError("axis", self.axis, "a direction of non-zero length")
 
 
 @dataclass(frozen=True)

@@ -61,18 +61,17 @@ class CalibratedCameraCfg:
         """Refuse what no camera can be."""
         for name in ("width_px", "height_px"):
             if getattr(self, name) < 16:
-                raise ConfigError(f"world.camera.{name}", getattr(self, name), "at least 16 pixels")
+                raise ConfigError(name, getattr(self, name), "at least 16 pixels")
         if not 0.0 < self.rate_hz <= 1000.0:
-            raise ConfigError("world.camera.rate_hz", self.rate_hz, "a frame rate above 0 Hz and up to 1000 Hz")
+            raise ConfigError("rate_hz", self.rate_hz, "a frame rate above 0 Hz and up to 1000 Hz")
         for name in ("focal_length_m", "pixel_width_m", "pixel_height_m"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(f"world.camera.{name}", getattr(self, name), "a length above 0 m")
+                raise ConfigError(name, getattr(self, name), "a length above 0 m")
         column, row = self.principal_point_px
         if not (0.0 <= column < self.width_px and 0.0 <= row < self.height_px):
-            raise ConfigError("world.camera.principal_point_px", self.principal_point_px, "a point on the sensor")
+            raise ConfigError("principal_point_px", self.principal_point_px, "a point on the sensor")
         if not _is_monotonic(self):
-            remedy = "a distortion that does not fold the image on the sensor"
-            raise ConfigError("world.camera.radial", self.radial, remedy)
+            raise ConfigError("radial", self.radial, "a distortion that does not fold the image on the sensor")
 
     @property
     def sensor_width_m(self) -> float:
@@ -131,8 +130,7 @@ def make_calibrated_camera(
     corners = np.array([(c, r) for c in (-0.5, cfg.width_px - 0.5) for r in (-0.5, cfg.height_px - 0.5)])
     reach = float(np.max(np.hypot(*ideal_coordinates(cfg, corners).T)))
     if not _rises(tuple(distortion[[0, 1, 4]]), reach):
-        remedy = "a milder distortion, OpenCV's model folds the image with this"
-        raise ConfigError("world.camera.radial", cfg.radial, remedy)
+        raise ConfigError("radial", cfg.radial, "a milder distortion, OpenCV's model folds the image with this")
     T_body_camera = make_transform(rotation_looking_along(direction_body, up_body), position_body_m)
     return Camera(cfg.width_px, cfg.height_px, cfg.matrix, distortion, T_body_camera, cfg.rate_hz)
 

@@ -35,12 +35,12 @@ class CameraCfg:
         """Refuse what no camera can be."""
         for name in ("width_px", "height_px"):
             if getattr(self, name) < 16:
-                raise ConfigError(f"world.camera.{name}", getattr(self, name), "at least 16 pixels")
+                raise ConfigError(name, getattr(self, name), "at least 16 pixels")
         if not 0.0 < self.rate_hz <= 1000.0:
-            raise ConfigError("world.camera.rate_hz", self.rate_hz, "a frame rate above 0 Hz and up to 1000 Hz")
+            raise ConfigError("rate_hz", self.rate_hz, "a frame rate above 0 Hz and up to 1000 Hz")
         for name in ("horizontal_fov_deg", "vertical_fov_deg"):
             if not 1.0 <= getattr(self, name) <= 150.0:
-                raise ConfigError(f"world.camera.{name}", getattr(self, name), "a full angle of 1 to 150 degrees")
+                raise ConfigError(name, getattr(self, name), "a full angle of 1 to 150 degrees")
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def make_camera(cfg: CameraCfg, position_body_m: Array, direction_body: Array, u
     corner = t_h**2 + t_v**2
     if abs(k1) * corner > 0.3:
         raise ConfigError(
-            "world.camera.vertical_fov_deg",
+            "vertical_fov_deg",
             cfg.vertical_fov_deg,
             f"an angle that suits {cfg.horizontal_fov_deg:g}° on {cfg.width_px} × {cfg.height_px} px, near "
             f"{2 * math.degrees(math.atan(t_h * cfg.height_px / cfg.width_px)):.0f}°",

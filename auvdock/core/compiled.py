@@ -1,41 +1,46 @@
 """Loops over pixels, lights and small matrices, compiled by Numba where NumPy would take dozens of calls.
 
 A compiled function is plain Python. It is compiled once, on its first call with arguments of its types, and kept on
-disk beside its module, or in the user's cache folder, or not at all where neither can be written. Arithmetic keeps to
-IEEE 754, so the same machine gives the same bits each time.
+disk beside its module, or in the user's cache folder, or not at all where neither can be written (`core.kept_code`).
+Arithmetic keeps to IEEE 754, so the same machine gives the same bits each time.
 
-Numba notices when the file of a kept function changes, but not when a function that it calls from another file does:
+Kept code is left when the file of its function changes, but not when a function that it calls from another file does:
 hence a compiled function calls only compiled functions of its own file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["cache_folder", "compiled", "compiling", "external"]
+from auvdock.core.kept_code import KeptCode
+
+__all__ = ["cache_folders", "compiled", "compiling", "external"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _numba: Any = import_module("numba")
 _events: Any = import_module("numba.core.event")
 _llvm: Any = import_module("llvmlite.binding")
+_NullCache: Any = import_module("numba.core.caching").NullCache
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a function with Numba; as in NumPy, x / 0 is `inf` or `nan`; indices are not checked."""
-    try:
-        return _numba.njit(cache=True, error_model="numpy")(function)
-    except RuntimeError:  # no folder for the cache can be written
-        return _numba.njit(error_model="numpy")(function)
+    made: Any = _numba.njit(error_model="numpy")(function)
+    if isinstance(getattr(made, "_cache", None), _NullCache):  # not if the environment asks for plain Python
+        with suppress(OSError):  # no file, as of code typed in
+            made._cache = KeptCode(function, Path(function.__code__.co_filename))
+    return made
 
 
-def cache_folder(function: Callable[..., object]) -> str | None:
-    """Where a compiled function is kept on disk; None where no folder could be written."""
-    return getattr(getattr(function, "stats", None), "cache_path", None)
+def cache_folders(function: object) -> tuple[Path, ...]:
+    """Where a compiled function is looked for and kept on disk, in this order; nowhere if it is not kept."""
+    kept = getattr(function, "_cache", None)
+    return kept.folders if isinstance(kept, KeptCode) else ()
 
 
 def external(library: Path, name: str, addresses: int) -> Callable[..., None]:

@@ -95,12 +95,12 @@ class Detections:
 
     def __post_init__(self) -> None:
         """Check shapes."""
+        check_shape("score", self.score, (None,))
         n = len(self.score)
         if self.flux is not None:
             check_shape("flux", self.flux, (n,))
         check_shape("xyxy", self.xyxy, (n, 4))
         check_shape("centre_px", self.centre_px, (n, 2))
-        check_shape("score", self.score, (n,))
         check_shape("class_id", self.class_id, (n,))
 
     def __len__(self) -> int:

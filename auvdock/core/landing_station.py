@@ -30,14 +30,12 @@ class TagCfg:
     def __post_init__(self) -> None:
         """Refuse what the family does not have."""
         if not 0 <= self.tag_id <= 586:
-            raise ConfigError(
-                "world.station.tag.tag_id", self.tag_id, "a number of 0 to 586, family 36h11 has 587 tags"
-            )
+            raise ConfigError("tag_id", self.tag_id, "a number of 0 to 586, family 36h11 has 587 tags")
         if not 0.02 <= self.size_m <= 2.0:
-            raise ConfigError("world.station.tag.size_m", self.size_m, "an edge of 0.02 to 2 m")
-        check_finite("world.station.tag.position_m", self.position_m, "three finite coordinates")
+            raise ConfigError("size_m", self.size_m, "an edge of 0.02 to 2 m")
+        check_finite("position_m", self.position_m, "three finite coordinates")
         if not 0.0 < self.reflectance <= 1.0:
-            raise ConfigError("world.station.tag.reflectance", self.reflectance, "a fraction above 0 and up to 1")
+            raise ConfigError("reflectance", self.reflectance, "a fraction above 0 and up to 1")
 
 
 @dataclass(frozen=True)
@@ -62,19 +60,17 @@ class GuideCfg:
     def __post_init__(self) -> None:
         """Refuse what is no guide."""
         for name in ("thickness_m", "mouth_half_width_m", "seat_radius_m", "seat_height_m"):
-            check_above(f"world.station.guide.{name}", getattr(self, name), 0.0, "a length above 0 m")
-        check_finite("world.station.guide.x_m", self.x_m, "two finite coordinates")
+            check_above(name, getattr(self, name), 0.0, "a length above 0 m")
+        check_finite("x_m", self.x_m, "two finite coordinates")
         if not 15.0 <= self.opening_half_angle_deg <= 75.0:
             raise ConfigError(
-                "world.station.guide.opening_half_angle_deg",
+                "opening_half_angle_deg",
                 self.opening_half_angle_deg,
                 "an angle of 15 to 75 degrees",
             )
         if self.mouth_half_width_m <= self.seat_radius_m:
-            raise ConfigError(
-                "world.station.guide.mouth_half_width_m", self.mouth_half_width_m, "more than seat_radius_m"
-            )
-        check_range("world.station.guide.friction", self.friction, 0.0, math.inf, "0 or more")
+            raise ConfigError("mouth_half_width_m", self.mouth_half_width_m, "more than seat_radius_m")
+        check_range("friction", self.friction, 0.0, math.inf, "0 or more")
 
     @property
     def top_m(self) -> float:
@@ -110,15 +106,14 @@ class LandingLatchCfg:
 
     def __post_init__(self) -> None:
         """Refuse an arm that never closes or has held before it has closed."""
-        where = "world.station.latch"
         for name in ("along_m", "across_m", "height_m"):
-            check_above(f"{where}.{name}", getattr(self, name), 0.0, "a length above 0 m")
+            check_above(name, getattr(self, name), 0.0, "a length above 0 m")
         for name in ("max_heading_deg", "max_tilt_deg"):
-            check_above(f"{where}.{name}", getattr(self, name), 0.0, "an angle above 0 and up to 90 degrees")
-            check_range(f"{where}.{name}", getattr(self, name), 0.0, 90.0, "an angle above 0 and up to 90 degrees")
+            check_above(name, getattr(self, name), 0.0, "an angle above 0 and up to 90 degrees")
+            check_range(name, getattr(self, name), 0.0, 90.0, "an angle above 0 and up to 90 degrees")
         for name in ("max_speed_m_s", "max_touchdown_m_s"):
-            check_above(f"{where}.{name}", getattr(self, name), 0.0, "a speed above 0 m/s")
-        check_range(f"{where}.hold_s", self.hold_s, 0.0, math.inf, "a time of 0 s or more")
+            check_above(name, getattr(self, name), 0.0, "a speed above 0 m/s")
+        check_range("hold_s", self.hold_s, 0.0, math.inf, "a time of 0 s or more")
 
 
 @dataclass(frozen=True)
@@ -142,14 +137,14 @@ class LandingStationCfg:
     def __post_init__(self) -> None:
         """Refuse what is no platform."""
         for name in ("depth_m", "length_m", "width_m", "height_m"):
-            check_above(f"world.station.{name}", getattr(self, name), 0.0, "a length above 0 m")
+            check_above(name, getattr(self, name), 0.0, "a length above 0 m")
         lamps = [beacon.position_m[2] for beacon in self.beacons]
         top_m = max([self.guide.top_m, self.tag.position_m[2], *lamps])
         remedy = f"more than {top_m:g} m, so high does the station reach above its platform"
-        check_above("world.station.depth_m", self.depth_m, top_m, remedy)
+        check_above("depth_m", self.depth_m, top_m, remedy)
         low_m = -min([0.0, *lamps])
         remedy = f"{low_m:g} m or more, so far does a light lie below the platform's upper face"
-        check_range("world.station.height_m", self.height_m, low_m, math.inf, remedy)
+        check_range("height_m", self.height_m, low_m, math.inf, remedy)
 
     @property
     def floor_below_m(self) -> float:

@@ -39,26 +39,18 @@ class RotatingBeaconCfg:
     def __post_init__(self) -> None:
         """Refuse what no beacon can be."""
         if not 0.01 <= self.rate_rev_s <= 10.0:
-            raise ConfigError(
-                "world.station.rotating.rate_rev_s", self.rate_rev_s, "a rate of 0.01 to 10 revolutions a second"
-            )
+            raise ConfigError("rate_rev_s", self.rate_rev_s, "a rate of 0.01 to 10 revolutions a second")
         if not 0.5 <= self.divergence_deg <= 120.0:
-            raise ConfigError(
-                "world.station.rotating.divergence_deg", self.divergence_deg, "a full angle of 0.5 to 120 degrees"
-            )
+            raise ConfigError("divergence_deg", self.divergence_deg, "a full angle of 0.5 to 120 degrees")
         if not 380.0 <= self.wavelength_nm <= 720.0:
-            raise ConfigError(
-                "world.station.rotating.wavelength_nm", self.wavelength_nm, "a visible wavelength, 380 to 720 nm"
-            )
-        check_finite("world.station.rotating.position_m", self.position_m, "three finite coordinates")
-        check_finite("world.station.rotating.initial_azimuth_deg", (self.initial_azimuth_deg,), "a finite angle")
-        check_above("world.station.rotating.power_w", self.power_w, 0.0, "a power above 0 W")
+            raise ConfigError("wavelength_nm", self.wavelength_nm, "a visible wavelength, 380 to 720 nm")
+        check_finite("position_m", self.position_m, "three finite coordinates")
+        check_finite("initial_azimuth_deg", (self.initial_azimuth_deg,), "a finite angle")
+        check_above("power_w", self.power_w, 0.0, "a power above 0 W")
         if not 0.0 < self.efficiency <= 1.0:
-            raise ConfigError("world.station.rotating.efficiency", self.efficiency, "a fraction above 0 and up to 1")
+            raise ConfigError("efficiency", self.efficiency, "a fraction above 0 and up to 1")
         if not -90.0 < self.elevation_deg < 90.0:
-            raise ConfigError(
-                "world.station.rotating.elevation_deg", self.elevation_deg, "above -90 and below 90 degrees"
-            )
+            raise ConfigError("elevation_deg", self.elevation_deg, "above -90 and below 90 degrees")
 
     def azimuth_rad(self, station_time_s: float) -> float:
         """Azimuth of the beam's axis at a station time, in (-π, π]."""
@@ -86,7 +78,7 @@ class BeaconClockCfg:
     def __post_init__(self) -> None:
         """Refuse negative deviations."""
         if not math.isfinite(self.offset_s):
-            raise ConfigError("world.clock.offset_s", self.offset_s, "a finite time")
+            raise ConfigError("offset_s", self.offset_s, "a finite time")
         for name in ("offset_std_s", "drift_ppm", "jitter_s"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"world.clock.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from auvdock.assets import asset
 from auvdock.core.beacons import BeaconCfg, BeaconLayout, ring_layout
 from auvdock.core.checks import check_above, check_range
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, located
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.strict import load_toml
 
@@ -33,10 +33,10 @@ class FunnelCfg:
     def __post_init__(self) -> None:
         """Refuse what is not a funnel."""
         for name in ("mouth_radius_m", "length_m", "tube_radius_m", "tube_length_m"):
-            check_above(f"world.station.funnel.{name}", getattr(self, name), 0.0, "a length above 0 m")
+            check_above(f"{name}", getattr(self, name), 0.0, "a length above 0 m")
         if self.tube_radius_m >= self.mouth_radius_m:
-            raise ConfigError("world.station.funnel.tube_radius_m", self.tube_radius_m, "less than mouth_radius_m")
-        check_range("world.station.funnel.friction", self.friction, 0.0, math.inf, "0 or more")
+            raise ConfigError("tube_radius_m", self.tube_radius_m, "less than mouth_radius_m")
+        check_range("friction", self.friction, 0.0, math.inf, "0 or more")
 
 
 @dataclass(frozen=True)
@@ -57,13 +57,12 @@ class LatchCfg:
 
     def __post_init__(self) -> None:
         """Refuse a latch that never closes or has held before it has closed."""
-        where = "world.station.latch"
-        check_range(f"{where}.depth_m", self.depth_m, 0.0, math.inf, "a depth of 0 m or more")
-        check_above(f"{where}.max_angle_deg", self.max_angle_deg, 0.0, "an angle above 0 and up to 90 degrees")
-        check_range(f"{where}.max_angle_deg", self.max_angle_deg, 0.0, 90.0, "an angle above 0 and up to 90 degrees")
+        check_range("depth_m", self.depth_m, 0.0, math.inf, "a depth of 0 m or more")
+        check_above("max_angle_deg", self.max_angle_deg, 0.0, "an angle above 0 and up to 90 degrees")
+        check_range("max_angle_deg", self.max_angle_deg, 0.0, 90.0, "an angle above 0 and up to 90 degrees")
         for name in ("max_speed_m_s", "max_entry_speed_m_s"):
-            check_above(f"{where}.{name}", getattr(self, name), 0.0, "a speed above 0 m/s")
-        check_range(f"{where}.hold_s", self.hold_s, 0.0, math.inf, "a time of 0 s or more")
+            check_above(name, getattr(self, name), 0.0, "a speed above 0 m/s")
+        check_range("hold_s", self.hold_s, 0.0, math.inf, "a time of 0 s or more")
 
 
 @dataclass(frozen=True)
@@ -91,22 +90,20 @@ class ConicalStationCfg:
 
     def __post_init__(self) -> None:
         """Refuse a station that reaches out of the water or into the ground, or whose latch lies beyond the tube."""
-        where, funnel = "world.station", self.funnel
+        funnel = self.funnel
         remedy = f"at most the tube's length, {funnel.tube_length_m:g} m"
-        check_range(f"{where}.latch.depth_m", self.latch.depth_m, 0.0, funnel.tube_length_m, remedy)
+        check_range("latch.depth_m", self.latch.depth_m, 0.0, funnel.tube_length_m, remedy)
         lamps = [beacon.position_m[2] for beacon in self.beacons]
         lamps += [self.rotating.position_m[2]] if self.rotating is not None else []
         above_m, below_m = max([funnel.mouth_radius_m, *lamps]), max([funnel.mouth_radius_m, *(-z for z in lamps)])
         remedy = f"more than {above_m:g} m, so high does the station reach above its mouth's centre"
-        check_above(f"{where}.depth_m", self.depth_m, above_m, remedy)
+        check_above("depth_m", self.depth_m, above_m, remedy)
         remedy = f"more than {below_m:g} m, so far does the station reach below its mouth's centre"
-        check_above(f"{where}.floor_below_m", self.floor_below_m, below_m, remedy)
-        check_range(f"{where}.array_count", self.array_count, 0, math.inf, "a number of 0 or more lights")
-        check_range(
-            f"{where}.array_beam_angle_deg", self.array_beam_angle_deg, 0.5, 360.0, "a full angle of 0.5 to 360 degrees"
-        )
-        check_range(f"{where}.array_tilt_deg", self.array_tilt_deg, -90.0, 90.0, "a tilt of -90 to 90 degrees")
-        check_above(f"{where}.array_power_w", self.array_power_w, 0.0, "a power above 0 W")
+        check_above("floor_below_m", self.floor_below_m, below_m, remedy)
+        check_range("array_count", self.array_count, 0, math.inf, "a number of 0 or more lights")
+        check_range("array_beam_angle_deg", self.array_beam_angle_deg, 0.5, 360.0, "a full angle of 0.5 to 360 degrees")
+        check_range("array_tilt_deg", self.array_tilt_deg, -90.0, 90.0, "a tilt of -90 to 90 degrees")
+        check_above("array_power_w", self.array_power_w, 0.0, "a power above 0 W")
 
     @property
     def layout(self) -> BeaconLayout:
@@ -116,17 +113,18 @@ class ConicalStationCfg:
 
 def conical_layout(cfg: ConicalStationCfg) -> BeaconLayout:
     """The lights of a conical station: `array_count` on the mouth's rim, then those listed."""
-    ring = (
-        ring_layout(
-            cfg.array_count,
-            cfg.funnel.mouth_radius_m,
-            inward_tilt_deg=cfg.array_tilt_deg,
-            beam_angle_deg=cfg.array_beam_angle_deg,
-            power_w=cfg.array_power_w,
+    with located("array_"):  # a lamp's `power_w` is the station's `array_power_w`
+        ring = (
+            ring_layout(
+                cfg.array_count,
+                cfg.funnel.mouth_radius_m,
+                inward_tilt_deg=cfg.array_tilt_deg,
+                beam_angle_deg=cfg.array_beam_angle_deg,
+                power_w=cfg.array_power_w,
+            )
+            if cfg.array_count > 0
+            else ()
         )
-        if cfg.array_count > 0
-        else ()
-    )
     return BeaconLayout(ring + cfg.beacons)
 
 

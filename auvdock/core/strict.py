@@ -1,23 +1,29 @@
-"""Strict TOML into frozen dataclasses: an unknown key is an error that names the nearest known one."""
+"""Strict TOML files into frozen dataclasses, and changes of them; see `auvdock.core.reader` for what is taken."""
 
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import tomllib
-import types
 import typing
 from collections.abc import Mapping
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_args
 
-import dacite
+from auvdock.core.errors import ConfigError, located
+from auvdock.core.reader import FINITE, from_mapping, hints_of, known_table, read_value
 
-from auvdock.core.errors import ConfigError
-
-__all__ = ["from_mapping", "load_toml", "merge", "read_toml", "to_plain"]
+__all__ = [
+    "from_mapping",
+    "load_toml",
+    "merge",
+    "names_file",
+    "read_toml",
+    "recheck",
+    "setting_type",
+    "to_plain",
+]
 
 T = TypeVar("T")
 
@@ -32,35 +38,18 @@ def read_toml(path: Path | Traversable) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError("file", str(path), f"a readable TOML file ({error})") from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # of tomllib: no TOML, a number too long, tables too deep
         raise ConfigError("file", str(path), f"valid TOML ({error})") from error
+
+
+def names_file(value: object) -> bool:
+    """Whether a setting that may be a preset's name or a file ("my_lake.toml") is a file."""
+    return isinstance(value, str) and value.endswith(".toml")
 
 
 def load_toml(cls: type[T], path: Path | Traversable) -> T:
     """Read a TOML file into the dataclass `cls`; see `from_mapping`."""
     return from_mapping(cls, read_toml(path))
-
-
-def from_mapping(cls: type[T], data: Mapping[str, Any], prefix: str = "") -> T:
-    """Build the frozen dataclass `cls` from nested plain data.
-
-    Lists become tuples, integers become floats where a float is wanted.
-
-    Raises:
-        ConfigError: an unknown or missing key, a value of the wrong type, or one that `cls` refuses.
-    """
-    _check_keys(cls, data, prefix)
-    try:
-        return dacite.from_dict(
-            cls, data, config=dacite.Config(strict=True, cast=[tuple], type_hooks={float: _to_float})
-        )
-    except dacite.MissingValueError as error:
-        raise ConfigError(f"{prefix}{error.field_path}", None, "a value, it has no default") from error
-    except dacite.WrongTypeError as error:
-        wanted = getattr(error.field_type, "__name__", str(error.field_type))
-        raise ConfigError(f"{prefix}{error.field_path}", error.value, f"a value of type {wanted}") from error
-    except dacite.DaciteError as error:
-        raise ConfigError(prefix.rstrip(".") or cls.__name__, dict(data), f"values that fit ({error})") from error
 
 
 def merge(base: T, overrides: Mapping[str, Any], prefix: str = "") -> T:
@@ -72,17 +61,47 @@ def merge(base: T, overrides: Mapping[str, Any], prefix: str = "") -> T:
     if not dataclasses.is_dataclass(base) or isinstance(base, type):
         raise TypeError("merge needs a dataclass instance")
     cls = type(base)
-    known = {field.name for field in dataclasses.fields(base)}
+    hints = hints_of(cls)
     changes: dict[str, Any] = {}
-    for key, value in overrides.items():
-        if key not in known:
-            raise _unknown_key(cls, key, prefix)
-        current = getattr(base, key)
+    for key, value in known_table(cls, overrides, prefix).items():
+        current, path = getattr(base, key), f"{prefix}{key}"
         if dataclasses.is_dataclass(current) and isinstance(value, Mapping):
-            changes[key] = merge(current, value, f"{prefix}{key}.")
+            changes[key] = merge(current, typing.cast(Mapping[str, Any], value), f"{path}.")
         else:
-            changes[key] = _convert(get_type_hints(cls)[key], value, f"{prefix}{key}")
-    return dataclasses.replace(base, **changes)  # type: ignore[type-var]
+            changes[key] = read_value(hints[key], value, path)
+    with located(prefix):
+        return dataclasses.replace(base, **changes)  # type: ignore[type-var]
+
+
+def recheck(value: T, prefix: str = "") -> T:
+    """The same dataclasses made anew from within, so that each checks its fields; for those made without.
+
+    Raises:
+        ConfigError: a field that is refused, or a number that is not finite.
+    """
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        raise TypeError("recheck needs a dataclass instance")
+    fields = [field.name for field in dataclasses.fields(value) if field.init]
+    values = {name: _rechecked(getattr(value, name), f"{prefix}{name}") for name in fields}
+    with located(prefix):
+        return type(value)(**values)
+
+
+def setting_type(cls: type, path: str, prefix: str = "") -> Any:  # noqa: ANN401 - a type as annotations write it
+    """The type of a dotted setting of the dataclass `cls`.
+
+    Raises:
+        ConfigError: no such setting.
+    """
+    name, _, rest = path.partition(".")
+    known_table(cls, {name: None}, prefix)
+    hint = hints_of(cls)[name]
+    if not rest:
+        return hint
+    for option in get_args(hint) or (hint,):
+        if dataclasses.is_dataclass(option):
+            return setting_type(typing.cast(type, option), rest, f"{prefix}{name}.")
+    raise ConfigError(f"{prefix}{path}", rest, f"{prefix}{name} alone, it has no settings of its own")
 
 
 def to_plain(value: Any) -> Any:  # noqa: ANN401 - mirrors JSON's own types
@@ -98,51 +117,12 @@ def to_plain(value: Any) -> Any:  # noqa: ANN401 - mirrors JSON's own types
     return value
 
 
-def _to_float(value: Any) -> float:  # noqa: ANN401
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise dacite.WrongTypeError(float, value)
-    return float(value)
-
-
-def _convert(hint: Any, value: Any, field: str) -> Any:  # noqa: ANN401
-    box = dataclasses.make_dataclass("Box", [("value", hint)])
-    try:
-        converted: Any = from_mapping(box, {"value": value})
-    except ConfigError as error:
-        raise ConfigError(field + error.field.removeprefix("value"), error.value, error.remedy) from error
-    return converted.value
-
-
-def _check_keys(cls: Any, data: Any, prefix: str) -> None:  # noqa: ANN401
-    if not dataclasses.is_dataclass(cls) or not isinstance(data, Mapping):
-        return
-    hints = get_type_hints(cls)
-    known = {field.name for field in dataclasses.fields(cls) if field.init}
-    for key, value in data.items():
-        if key not in known:
-            raise _unknown_key(cls, key, prefix)
-        if isinstance(value, float) and not math.isfinite(value):
-            raise ConfigError(f"{prefix}{key}", value, "a finite number")
-        _check_nested(hints[key], value, f"{prefix}{key}")
-
-
-def _check_nested(hint: Any, value: Any, path: str) -> None:  # noqa: ANN401
-    if isinstance(value, bool) and hint is int:
-        raise ConfigError(path, value, "a whole number")  # Python counts True as 1
-    if dataclasses.is_dataclass(hint):
-        _check_keys(hint, value, f"{path}.")
-    elif get_origin(hint) in (tuple, list) and isinstance(value, tuple | list):
-        inner = [argument for argument in get_args(hint) if argument is not Ellipsis]
-        for index, item in enumerate(value):
-            _check_nested(inner[min(index, len(inner) - 1)], item, f"{path}[{index}]")
-    elif get_origin(hint) in (typing.Union, types.UnionType):
-        for option in get_args(hint):
-            if dataclasses.is_dataclass(option) and isinstance(value, Mapping):
-                _check_keys(option, value, f"{path}.")
-
-
-def _unknown_key(cls: Any, key: str, prefix: str) -> ConfigError:  # noqa: ANN401
-    known = [field.name for field in dataclasses.fields(cls) if field.init]
-    near = difflib.get_close_matches(key, known, n=1)
-    remedy = f"the known key {near[0]!r}" if near else f"one of {', '.join(known)}"
-    return ConfigError(f"{prefix}{key}", key, f"{remedy} (this key is unknown)")
+def _rechecked(value: Any, path: str) -> Any:  # noqa: ANN401
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return recheck(value, f"{path}.")
+    if isinstance(value, tuple):
+        items = typing.cast(tuple[Any, ...], value)
+        return tuple(_rechecked(item, f"{path}[{index}]") for index, item in enumerate(items))
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ConfigError(path, value, FINITE)
+    return value

@@ -75,9 +75,9 @@ class ActuatorCfg:
     def __post_init__(self) -> None:
         """Check the kind."""
         if self.kind not in ("thruster", "fin"):
-            raise ConfigError(f"actuators.{self.name}.kind", self.kind, "'thruster' or 'fin'")
+            raise ConfigError("kind", self.kind, "'thruster' or 'fin'")
         if not self.time_constant_s > 0.0:
-            raise ConfigError(f"actuators.{self.name}.time_constant_s", self.time_constant_s, "a time above 0 s")
+            raise ConfigError("time_constant_s", self.time_constant_s, "a time above 0 s")
 
 
 @dataclass(frozen=True)
@@ -107,13 +107,13 @@ class HullPartCfg:
     def __post_init__(self) -> None:
         """Check shape and size."""
         if self.shape not in ("box", "capsule", "cylinder"):
-            raise ConfigError(f"hull.{self.name}.shape", self.shape, "'box', 'capsule' or 'cylinder'")
+            raise ConfigError("shape", self.shape, "'box', 'capsule' or 'cylinder'")
         if not all(size > 0.0 for size in self.size_m):
-            raise ConfigError(f"hull.{self.name}.size_m", self.size_m, "three lengths above 0 m")
+            raise ConfigError("size_m", self.size_m, "three lengths above 0 m")
         if self.shape != "box" and self.size_m[1] != self.size_m[2]:
-            raise ConfigError(f"hull.{self.name}.size_m", self.size_m, "the same diameter along y and z")
+            raise ConfigError("size_m", self.size_m, "the same diameter along y and z")
         if self.shape == "capsule" and self.size_m[0] <= self.size_m[1]:
-            raise ConfigError(f"hull.{self.name}.size_m", self.size_m, "a capsule longer than thick")
+            raise ConfigError("size_m", self.size_m, "a capsule longer than thick")
 
 
 @dataclass(frozen=True)

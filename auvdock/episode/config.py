@@ -13,6 +13,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.strict import merge, read_toml
 from auvdock.envs.config import WorldCfg, rotating_world_cfg
 from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.episode.files import embed_files
 from auvdock.perception.landing.config import LandingPerceptionCfg
 from auvdock.perception.pipeline import PerceptionCfg
 
@@ -43,10 +44,12 @@ class EpisodeCfg:
     def override(self, changes: Mapping[str, Any]) -> EpisodeCfg:
         """A copy with nested fields replaced, checked as strictly as a TOML file.
 
+        A station's or water's file is read now: the copy holds what it says.
+
         Raises:
             ConfigError: an unknown key or a value that does not fit.
         """
-        return merge(self, changes)
+        return merge(self, embed_files(changes, type(self.world.station)))
 
 
 @dataclass(frozen=True)
@@ -60,10 +63,12 @@ class LandingEpisodeCfg:
     def override(self, changes: Mapping[str, Any]) -> LandingEpisodeCfg:
         """A copy with nested fields replaced, checked as strictly as a TOML file.
 
+        A station's or water's file is read now: the copy holds what it says.
+
         Raises:
             ConfigError: an unknown key or a value that does not fit.
         """
-        return merge(self, changes)
+        return merge(self, embed_files(changes, type(self.world.station)))
 
 
 AnyEpisodeCfg: TypeAlias = EpisodeCfg | LandingEpisodeCfg

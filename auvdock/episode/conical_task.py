@@ -9,6 +9,7 @@ from auvdock.controllers.named import make_named_pilot
 from auvdock.controllers.pilot import ConicalPilot, Pilot
 from auvdock.controllers.rotating.pilot import RotatingPilot
 from auvdock.core.contracts import Percept
+from auvdock.core.errors import located
 from auvdock.envs.vehicle_world import Sensed
 from auvdock.envs.world import DockingWorld
 from auvdock.episode.config import EpisodeCfg
@@ -39,7 +40,8 @@ class ConicalTask:
         self.station = cfg.world.station
         self.name = "conical station" if self.station.rotating is None else "rotating beacon"
         self.detector = cfg.perception.detector
-        self._detector = make_station_detector(self.detector, self.station)
+        with located("perception."):
+            self._detector = make_station_detector(self.detector, self.station)
         self.world = DockingWorld(cfg.world, self.detector)
         self._perception = BeaconPerception(
             cfg.perception,
@@ -48,7 +50,8 @@ class ConicalTask:
             self.station.rotating,
             heading_surveyed=cfg.world.station_heading == "surveyed",
         )
-        self.pilot = make_pilot(cfg, self.world)
+        with located("control."):
+            self.pilot = make_pilot(cfg, self.world)
 
     def reset(self) -> None:
         """Forget the tracks."""

@@ -7,6 +7,7 @@ from typing import cast
 from auvdock.controllers.landing.pilot import LandingPilot
 from auvdock.controllers.named import PilotFactory, make_named_pilot
 from auvdock.core.contracts import Percept
+from auvdock.core.errors import located
 from auvdock.envs.landing_world import LandingWorld
 from auvdock.envs.vehicle_world import Sensed
 from auvdock.episode.config import LandingEpisodeCfg
@@ -43,15 +44,18 @@ class LandingTask:
         """
         self.station = cfg.world.station
         self.detector = cfg.perception.detector
-        self._detector = make_detector(self.detector)
-        self._tag_detector = make_tag_detector(cfg.perception.tag_detector, (self.station.tag.tag_id,))
+        with located("perception."):
+            self._detector = make_detector(self.detector)
+            self._tag_detector = make_tag_detector(cfg.perception.tag_detector, (self.station.tag.tag_id,))
         self.world = LandingWorld(cfg.world, self.detector, cfg.perception.tag_detector)
         vehicle, camera = self.world.simulator.vehicle, self.world.camera
         self._perception = LandingPerception(cfg.perception, camera, self.station)
         # It reads more of a percept than other pilots do; `perceive` gives it no other.
         own = cast(PilotFactory, LandingPilot)
         dt_s = 1.0 / cfg.world.control_hz
-        self.pilot = make_named_pilot(cfg.control.controller, own, cfg.control, vehicle, self.station, camera, dt_s)
+        control = cfg.control
+        with located("control."):
+            self.pilot = make_named_pilot(control.controller, own, control, vehicle, self.station, camera, dt_s)
 
     def reset(self) -> None:
         """Forget the pose and its filter."""

@@ -68,10 +68,10 @@ class FlashModelCfg:
         """Refuse what is no width."""
         for name in ("contrast_50_dn", "slope", "background_px", "floor_dn", "box_scale"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(f"detection.flash.{name}", getattr(self, name), "a number above 0")
+                raise ConfigError(name, getattr(self, name), "a number above 0")
         for name in ("centre_shift", "centre_spread", "flux_spread"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"detection.flash.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 _FLASH = FlashModelCfg()
@@ -129,13 +129,13 @@ class DetectionModelCfg:
         """Refuse what is no probability or no width."""
         for name in ("contrast_50_dn", "slope", "score_gain"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(f"detection.{name}", getattr(self, name), "a number above 0")
+                raise ConfigError(name, getattr(self, name), "a number above 0")
         for name in ("surround_factor", "merge_px", "merge_radii", "centre_floor_px", "centre_at_100", "false_alarms"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"detection.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
         for name in ("ceiling", "wrong_colour"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ConfigError(f"detection.{name}", getattr(self, name), "a probability of 0 to 1")
+                raise ConfigError(name, getattr(self, name), "a probability of 0 to 1")
 
 
 class Flash(NamedTuple):

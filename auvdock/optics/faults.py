@@ -31,9 +31,9 @@ class FaultCfg:
         for name in ("tag_hidden_from_s", "tag_hidden_below_m"):
             value = getattr(self, name)
             if value is not None and not value >= 0.0:
-                raise ConfigError(f"world.faults.{name}", value, "0 or more, or nothing")
+                raise ConfigError(name, value, "0 or more, or nothing")
         if not self.tag_hidden_for_s >= 0.0:
-            raise ConfigError("world.faults.tag_hidden_for_s", self.tag_hidden_for_s, "a time of 0 s or more")
+            raise ConfigError("tag_hidden_for_s", self.tag_hidden_for_s, "a time of 0 s or more")
 
 
 class TagCover:
@@ -66,5 +66,5 @@ def dead_indices(layout: BeaconLayout, names: tuple[str, ...]) -> IntArray:
     known = [beacon.name for beacon in layout.beacons]
     for name in names:
         if name not in known:
-            raise ConfigError("world.faults.dead_lights", name, f"one of {', '.join(known)}")
+            raise ConfigError("dead_lights", name, f"one of {', '.join(known)}")
     return np.array([known.index(name) for name in names], dtype=np.int64)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -12,25 +9,27 @@ from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, Image
 from auvdock.core.errors import GraphicsError
+from auvdock.optics.offscreen import Offscreen
 from auvdock.sim.mj import MjModel, mujoco
 
-__all__ = ["StaticRenderer", "offscreen_context", "probe_gl"]
+__all__ = ["StaticRenderer", "probe_gl"]
 
 _NEAR_M, _FAR_M = 0.05, 80.0
-_COARSE = {"offsamples": 0, "shadowsize": 0, "numslices": 12, "numstacks": 6, "numquads": 1}
-"""Quality while the context is made: no multisampling, no shadows, and few facets on what is round."""
 _UNSEEN_GROUP = 5
-_REMEDY = (
-    "install libegl1 and libgl1-mesa-dri and set MUJOCO_GL=egl, or install libosmesa6 and set MUJOCO_GL=osmesa; "
-    "or run without images: --fidelity beacons"
-)
+_PROBE_XML = """
+<mujoco><worldbody>
+  <geom type="box" pos="0 0 2.5" size="3 3 0.5" rgba="1 0.5 0 1"/>
+</worldbody></mujoco>
+"""
+"""A wall 2 m before a camera in the origin that looks along z."""
+_PROBE_DISTANCE_M = 2.0
 
 
 class StaticRenderer:
     """Draws what does not move: geoms fixed to the world, under one light from above.
 
     The vehicle itself is not drawn, so a camera may sit inside its hull. No context is made before the first `render`;
-    after a fork or unpickling a new one is made in the new process.
+    after a fork, if the driver survives one, and after unpickling a new one is made in the new process.
     """
 
     def __init__(
@@ -47,14 +46,8 @@ class StaticRenderer:
         self._hidden = hidden_geoms
         self._size = (width_px, height_px)
         self._tangents = (tangent_x, tangent_y)
-        self._process = -1
-        self._drop()
-
-    def _drop(self) -> None:
-        self._gl: Any = None
-        self._context: Any = None
+        self._offscreen: Offscreen | None = None
         self._scene: Any = None
-        self._process = -1
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but OpenGL's state, which lives in one process."""
@@ -68,11 +61,9 @@ class StaticRenderer:
 
     def close(self) -> None:
         """Free the context, if this process has one."""
-        if self._process == os.getpid():
-            self._gl.make_current()
-            self._context.free()
-            self._gl.free()
-        self._drop()
+        if self._offscreen is not None:
+            self._offscreen.close()
+        self._offscreen = self._scene = None
 
     def render(self, T_world_camera: Array) -> tuple[Image, NDArray[np.float32]]:
         """Shaded albedo (h, w, 3) uint8 and depth along the optical axis (h, w) in metres; rows from the bottom up.
@@ -80,14 +71,10 @@ class StaticRenderer:
         Depth is `inf` where there is nothing.
 
         Raises:
-            GraphicsError: no OpenGL context can be had here; the message says what to install.
+            GraphicsError: no OpenGL context can be had here, or it is at work in another thread; the message says what
+                to install or to do.
         """
-        if self._process != os.getpid():
-            self._drop()
-            self._open()
-        self._gl.make_current()
-        width, height = self._size
-        scene = self._scene
+        offscreen, scene = self._drawn_by()
         for camera in scene.camera:
             camera.pos[:] = T_world_camera[:3, 3]
             camera.forward[:] = T_world_camera[:3, 2]
@@ -95,12 +82,8 @@ class StaticRenderer:
             camera.frustum_near, camera.frustum_far = _NEAR_M, _FAR_M
             camera.frustum_top, camera.frustum_bottom = self._tangents[1] * _NEAR_M, -self._tangents[1] * _NEAR_M
             camera.frustum_center, camera.frustum_width = 0.0, self._tangents[0] * _NEAR_M
-        rect = mujoco.MjrRect(0, 0, width, height)
-        mujoco.mjr_render(rect, scene, self._context)
-        colour = np.empty((height, width, 3), dtype=np.uint8)
-        depth = np.empty((height, width), dtype=np.float32)
-        mujoco.mjr_readPixels(colour, depth, rect, self._context)
-        # Reversed depth: 1 at the near plane, 0 at the far plane.
+        depth = np.empty(self._size[::-1], dtype=np.float32)
+        colour = offscreen.draw(scene, depth)
         empty = depth <= 0.0
         depth *= np.float32(_FAR_M - _NEAR_M)
         depth += np.float32(_NEAR_M)
@@ -108,29 +91,23 @@ class StaticRenderer:
         depth[empty] = np.inf
         return colour, depth
 
-    def _open(self) -> None:
-        width, height = self._size
+    @property
+    def name(self) -> str:
+        """What draws.
+
+        Raises:
+            GraphicsError: no OpenGL context can be had here; the message says what to install or to do.
+        """
+        return self._drawn_by()[0].name
+
+    def _drawn_by(self) -> tuple[Offscreen, Any]:
+        if self._offscreen is None or not self._offscreen.is_ours:
+            self._offscreen = Offscreen(self._model, *self._size, coarse=True)
+            self._scene = self._static_scene()
+        return self._offscreen, self._scene
+
+    def _static_scene(self) -> Any:  # noqa: ANN401
         model = self._model
-        quality = model.vis.quality
-        kept = {name: getattr(quality, name) for name in _COARSE}
-        try:
-            self._gl = offscreen_context(width, height)
-            self._gl.make_current()
-            for name, value in _COARSE.items():
-                setattr(quality, name, value)
-            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-            mujoco.mjr_resizeOffscreen(width, height, self._context)
-            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
-        except GraphicsError:
-            self._drop()
-            raise
-        except Exception as error:
-            self._drop()
-            raise GraphicsError(f"no OpenGL context for rendering ({error}); {_REMEDY}") from error
-        finally:
-            for name, value in kept.items():
-                setattr(quality, name, value)
-        self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         scene = mujoco.MjvScene(model, 2 * model.ngeom + 100)
@@ -151,39 +128,25 @@ class StaticRenderer:
         light.headlight, light.castshadow = 0, 0
         light.pos[:], light.dir[:] = (0.0, 0.0, 10.0), (0.0, 0.0, -1.0)
         light.ambient[:], light.diffuse[:], light.specular[:] = 0.5, 0.5, 0.0
-        self._scene = scene
-        self._process = os.getpid()
-
-
-def offscreen_context(width_px: int, height_px: int) -> Any:  # noqa: ANN401
-    """An OpenGL context without a window: MUJOCO_GL's choice, else EGL, OSMesa or, on a desktop, GLFW.
-
-    Raises:
-        GraphicsError: none can be had; the message says what to install.
-    """
-    chosen = os.environ.get("MUJOCO_GL", "")
-    desktop = sys.platform != "linux" or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
-    makers = ["mujoco"] if chosen or desktop else []
-    makers += [] if chosen else ["mujoco.egl", "mujoco.osmesa"]
-    failures: list[str] = []
-    for maker in makers:
-        try:
-            return import_module(maker).GLContext(width_px, height_px)
-        except Exception as error:  # drivers fail in many ways: ImportError, AttributeError, RuntimeError, GLError
-            failures.append(f"{maker.removeprefix('mujoco.')}: {str(error).splitlines()[0] if str(error) else error!r}")
-    raise GraphicsError(f"no OpenGL context for rendering ({'; '.join(failures)}); {_REMEDY}")
+        return scene
 
 
 def probe_gl() -> str:
-    """Make a context, ask it for its renderer's name, and free it.
+    """Draw a wall and look at it; the name of what drew it.
 
     Raises:
-        GraphicsError: no OpenGL context can be had.
+        GraphicsError: no OpenGL context can be had, or what it draws is wrong.
     """
-    context = offscreen_context(16, 16)
+    renderer = StaticRenderer(mujoco.MjModel.from_xml_string(_PROBE_XML), 16, 16, 1.0, 1.0)
     try:
-        context.make_current()
-        name = import_module("OpenGL.GL").glGetString(import_module("OpenGL.GL").GL_RENDERER)
-        return name.decode() if isinstance(name, bytes) else type(context).__module__
+        colour, depth = renderer.render(np.eye(4))
+        red, green, blue = (int(value) for value in colour[8, 8])
+        distance_m = float(depth[8, 8])
+        if not (red > green > blue == 0) or abs(distance_m - _PROBE_DISTANCE_M) > 0.01 * _PROBE_DISTANCE_M:
+            raise GraphicsError(
+                f"{renderer.name}: draws an orange wall at {_PROBE_DISTANCE_M:g} m as ({red}, {green}, {blue}) at "
+                f"{distance_m:.3g} m; update the graphics driver, or set MUJOCO_GL to another of egl and osmesa"
+            )
+        return renderer.name
     finally:
-        context.free()
+        renderer.close()

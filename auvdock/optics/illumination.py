@@ -39,7 +39,7 @@ class Illumination:
         self.lamps_m: Array = lit.lights.positions_m[:count] @ rotation.T + origin
         self.spill_w_sr: Array = spill[:, None] * bands
         self.spill_w_sr[lit.dead] = 0.0
-        self.absorption_per_m: Array = lit.lights.absorption_per_m[:count]
+        self.absorption_per_m: Array = lit.lights.absorption_per_m[:count].copy()
 
     def at(self, points_world: Array, T_world_camera: Array) -> Array:
         """(n, 3) irradiance per band at points (n, 3) on surfaces that face up, the camera being at a pose (4, 4)."""

@@ -58,17 +58,15 @@ class LampCfg:
     def __post_init__(self) -> None:
         """Refuse what no lamp can be."""
         if not (math.isfinite(self.power_w) and self.power_w >= 0.0):
-            raise ConfigError("world.lamp.power_w", self.power_w, "a power of 0 W or more")
+            raise ConfigError("power_w", self.power_w, "a power of 0 W or more")
         if not 0.0 < self.efficiency <= 1.0:
-            raise ConfigError("world.lamp.efficiency", self.efficiency, "a fraction above 0 and up to 1")
+            raise ConfigError("efficiency", self.efficiency, "a fraction above 0 and up to 1")
         if not 5.0 <= self.beam_angle_deg <= 170.0:
-            raise ConfigError("world.lamp.beam_angle_deg", self.beam_angle_deg, "a full angle of 5 to 170 degrees")
+            raise ConfigError("beam_angle_deg", self.beam_angle_deg, "a full angle of 5 to 170 degrees")
         if any(share < 0.0 for share in self.band_shares) or not 0.0 < sum(self.band_shares) <= 1.0 + 1e-9:
-            raise ConfigError(
-                "world.lamp.band_shares", self.band_shares, "shares of 0 or more that add up to at most 1"
-            )
+            raise ConfigError("band_shares", self.band_shares, "shares of 0 or more that add up to at most 1")
         if not self.positions_m:
-            raise ConfigError("world.lamp.positions_m", self.positions_m, "at least one lamp; 'lamp' left out for none")
+            raise ConfigError("positions_m", self.positions_m, "at least one lamp; 'lamp' left out for none")
 
 
 class VehicleLamp:

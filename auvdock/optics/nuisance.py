@@ -149,7 +149,7 @@ class NuisanceCfg:
         """Check the names."""
         for part in PARTS:
             if getattr(self, part) not in LEVELS:
-                raise ConfigError(f"world.nuisance.{part}", getattr(self, part), f"one of {', '.join(LEVELS)}")
+                raise ConfigError(part, getattr(self, part), f"one of {', '.join(LEVELS)}")
 
     @property
     def flicker_level(self) -> FlickerLevel:

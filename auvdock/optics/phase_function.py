@@ -18,15 +18,20 @@ _ONSET_RAD = 0.5
 
 
 @compiled
-def fournier_forand(angle_rad: Array) -> Array:
+def fournier_forand(angle_rad: Array, index: float = _INDEX, slope: float = _SLOPE) -> Array:
     """(n,) phase function in 1/sr at scattering angles (n,), ∫ p dω = 1 (Fournier & Forand 1994).
 
     In the form of Fournier & Jonasz (1999), for particles of one refractive index with a power law of sizes. With n =
     1.10 and μ = 3.5835 its share of backscattering is 0.0183, that of Petzold's (1972) average (Mobley et al. 2002).
     Not defined at 0, where it has a pole that can be integrated.
+
+    Args:
+        angle_rad: scattering angles.
+        index: refractive index n of the particles relative to water.
+        slope: μ of their Junge law of sizes.
     """
-    nu = (3.0 - _SLOPE) / 2.0
-    scale = 4.0 / (3.0 * (_INDEX - 1.0) ** 2)
+    nu = (3.0 - slope) / 2.0
+    scale = 4.0 / (3.0 * (index - 1.0) ** 2)
     half2 = np.sin(0.5 * angle_rad) ** 2
     delta = scale * half2
     power, back = delta**nu, scale**nu

@@ -34,19 +34,17 @@ class ExposureCfg:
     def __post_init__(self) -> None:
         """Refuse what cannot settle."""
         if not 0.0 < self.saturated_share < 0.5:
-            raise ConfigError(
-                "world.imaging.exposure.saturated_share", self.saturated_share, "a share above 0 and below 0.5"
-            )
+            raise ConfigError("saturated_share", self.saturated_share, "a share above 0 and below 0.5")
         if not 0.0 < self.min_s <= self.max_s:
-            raise ConfigError("world.imaging.exposure.min_s", self.min_s, "a time above 0 s, at most max_s")
+            raise ConfigError("min_s", self.min_s, "a time above 0 s, at most max_s")
         if not self.initial_s > 0.0:
-            raise ConfigError("world.imaging.exposure.initial_s", self.initial_s, "a time above 0 s")
+            raise ConfigError("initial_s", self.initial_s, "a time above 0 s")
         if not self.max_gain >= 1.0:
-            raise ConfigError("world.imaging.exposure.max_gain", self.max_gain, "a gain of 1 or more")
+            raise ConfigError("max_gain", self.max_gain, "a gain of 1 or more")
         if not 1.0 < self.max_step <= 4.0:
-            raise ConfigError("world.imaging.exposure.max_step", self.max_step, "a factor above 1 and up to 4")
+            raise ConfigError("max_step", self.max_step, "a factor above 1 and up to 4")
         if not 0.0 <= self.dead_band < 1.0:
-            raise ConfigError("world.imaging.exposure.dead_band", self.dead_band, "a fraction of 0 or more and below 1")
+            raise ConfigError("dead_band", self.dead_band, "a fraction of 0 or more and below 1")
 
 
 @dataclass(frozen=True)
@@ -81,12 +79,12 @@ class ImagingCfg:
         """Refuse what no camera can be."""
         for name in ("sensor_width_m", "f_number", "lens_sigma_px", "full_well_e"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(f"world.imaging.{name}", getattr(self, name), "a number above 0")
+                raise ConfigError(name, getattr(self, name), "a number above 0")
         for name in ("lamp_radius_m", "read_noise_e"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"world.imaging.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
         for name in ("lens_transmission", "lamp_spill"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ConfigError(f"world.imaging.{name}", getattr(self, name), "a fraction of 0 to 1")
+                raise ConfigError(name, getattr(self, name), "a fraction of 0 to 1")
         if self.encoding not in ("sqrt", "linear"):
-            raise ConfigError("world.imaging.encoding", self.encoding, "'sqrt' or 'linear'")
+            raise ConfigError("encoding", self.encoding, "'sqrt' or 'linear'")

@@ -76,13 +76,13 @@ class TagModelCfg:
         """Refuse what is no probability or no width."""
         for name in ("cell_50_px", "cell_slope", "snr_50", "snr_slope"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(f"tag_detection.{name}", getattr(self, name), "a number above 0")
+                raise ConfigError(name, getattr(self, name), "a number above 0")
         for name in ("corner_floor_px", "corner_noise_px"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"tag_detection.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
         for name in ("ceiling", "cut_share"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ConfigError(f"tag_detection.{name}", getattr(self, name), "a probability of 0 to 1")
+                raise ConfigError(name, getattr(self, name), "a probability of 0 to 1")
 
 
 class TagSight(NamedTuple):

@@ -49,7 +49,7 @@ class TagScene:
         self.light = Illumination(lit)
         self.cells_to_world = lit.T_world_station[:3, :3] @ tag_to_station(tag)
         self.cells_to_world[:, 2] += lit.T_world_station[:3, 3]
-        self.normal_world: Array = lit.T_world_station[:3, 2]
+        self.normal_world: Array = lit.T_world_station[:3, 2].copy()
         self.centre_world = self.to_world(corners_station_m(tag)).mean(axis=0)
         self._corners = self.to_world(corners_station_m(tag))
         self._outline = self.to_world(corners_station_m(tag, margin_cells=1.0))

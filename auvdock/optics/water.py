@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from auvdock.assets import asset
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
-from auvdock.core.strict import load_toml
+from auvdock.core.strict import load_toml, names_file
 from auvdock.optics.bands import BANDS_NM, interpolate_bands
 
 __all__ = ["WaterCfg", "load_water", "with_attenuation"]
@@ -38,11 +39,11 @@ class WaterCfg:
         """Refuse what no water can be."""
         for name in ("absorption_per_m", "scattering_per_m"):
             if not all(math.isfinite(value) and value >= 0.0 for value in getattr(self, name)):
-                raise ConfigError(f"water.{name}", getattr(self, name), "three coefficients of 0 1/m or more")
+                raise ConfigError(name, getattr(self, name), "three coefficients of 0 1/m or more")
         if not 0.001 <= self.scattering_angle_rad <= 0.5:
-            raise ConfigError("water.scattering_angle_rad", self.scattering_angle_rad, "an angle of 0.001 to 0.5 rad")
+            raise ConfigError("scattering_angle_rad", self.scattering_angle_rad, "an angle of 0.001 to 0.5 rad")
         if not 0.0 <= self.backscatter_ratio <= 0.5:
-            raise ConfigError("water.backscatter_ratio", self.backscatter_ratio, "a fraction of 0 to 0.5")
+            raise ConfigError("backscatter_ratio", self.backscatter_ratio, "a fraction of 0 to 0.5")
 
     @property
     def absorption(self) -> Array:
@@ -78,24 +79,28 @@ class WaterCfg:
         return interpolate_bands(self.scattering, wavelength_nm)
 
 
-def load_water(name: str) -> WaterCfg:
-    """A water preset by name: Jerlov "I" to "9C", "clear", "pool" or "lake".
+def load_water(water: str | WaterCfg) -> WaterCfg:
+    """A water: as it is given, of a TOML file ("my_lake.toml", written as the presets are), or a preset by name.
+
+    Presets are Jerlov "I" to "9C", "clear", "pool" and "lake".
 
     Raises:
         ConfigError: no such preset, or a file that does not fit.
     """
-    return load_toml(WaterCfg, asset("waters", name))
+    if isinstance(water, WaterCfg):
+        return water
+    if names_file(water):
+        return load_toml(WaterCfg, Path(water))
+    try:
+        return load_toml(WaterCfg, asset("waters", water))
+    except ConfigError as error:
+        raise ConfigError(error.field, error.value, f"{error.remedy}, or a TOML file of yours") from error
 
 
-def with_attenuation(water: WaterCfg, c_450: float, field: str = "attenuation_per_m") -> WaterCfg:
+def with_attenuation(water: WaterCfg, c_450: float) -> WaterCfg:
     """The same water more or less turbid: b is scaled in all bands so that c(450 nm) = a + b is as given.
 
     Turbidity moves scattering and leaves absorption alone. A water without scattering gets b ∝ 1/λ.
-
-    Args:
-        water: the water.
-        c_450: c(450 nm) in 1/m.
-        field: what the user calls it, for the error.
 
     Raises:
         ConfigError: not finite, or below the water's absorption at 450 nm.
@@ -103,7 +108,7 @@ def with_attenuation(water: WaterCfg, c_450: float, field: str = "attenuation_pe
     a_450, b_450 = water.absorption_per_m[0], water.scattering_per_m[0]
     if not math.isfinite(c_450) or c_450 < a_450:
         raise ConfigError(
-            field,
+            "attenuation_per_m",
             c_450,
             f"a finite attenuation of at least {a_450:g} 1/m, the absorption of {water.name!r} at 450 nm",
         )

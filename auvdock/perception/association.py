@@ -52,10 +52,10 @@ class Association(Protocol):
 
 
 def pose_estimate(solution: PnpSolution, beacon_ids: tuple[int, ...], measured: bool) -> PoseEstimate:
-    """The contract's form of a solution."""
+    """The contract's form of a solution; it shares no memory with it, for others keep it."""
     return PoseEstimate(
-        T_station_camera=solution.T_station_camera(),
-        covariance=solution.covariance(),
+        T_station_camera=solution.T_station_camera().copy(),
+        covariance=solution.covariance().copy(),
         beacon_ids=beacon_ids,
         solver=solution.solver,
         reprojection_error_px=solution.error_px,

@@ -49,17 +49,17 @@ class AuthenticationCfg:
     def __post_init__(self) -> None:
         """Refuse thresholds without meaning."""
         if self.min_beacons < 4:
-            raise ConfigError("authentication.min_beacons", self.min_beacons, "4 or more, PnP needs 4")
+            raise ConfigError("min_beacons", self.min_beacons, "4 or more, PnP needs 4")
         if not 0.0 < self.max_angle_deg <= 90.0:
-            raise ConfigError("authentication.max_angle_deg", self.max_angle_deg, "an angle above 0 and up to 90")
+            raise ConfigError("max_angle_deg", self.max_angle_deg, "an angle above 0 and up to 90")
         if not 0.0 <= self.min_confidence <= 1.0:
-            raise ConfigError("authentication.min_confidence", self.min_confidence, "a fraction of 0 to 1")
+            raise ConfigError("min_confidence", self.min_confidence, "a fraction of 0 to 1")
         for name in ("min_occurrences", "proposals", "max_candidates"):
             if getattr(self, name) < 1:
-                raise ConfigError(f"authentication.{name}", getattr(self, name), "1 or more")
+                raise ConfigError(name, getattr(self, name), "1 or more")
         for name in ("tolerance", "tolerance_px"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"authentication.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
 
 
 class Authenticator:

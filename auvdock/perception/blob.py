@@ -47,11 +47,11 @@ class BlobCfg:
     def __post_init__(self) -> None:
         """Refuse thresholds without meaning."""
         if not 0.0 <= self.min_threshold < self.max_threshold <= 255.0:
-            raise ConfigError("detector.min_threshold", self.min_threshold, "0 <= min_threshold < max_threshold <= 255")
+            raise ConfigError("min_threshold", self.min_threshold, "0 <= min_threshold < max_threshold <= 255")
         if not self.threshold_step >= 1.0:
-            raise ConfigError("detector.threshold_step", self.threshold_step, "1 or more")
+            raise ConfigError("threshold_step", self.threshold_step, "1 or more")
         if not 0.0 < self.min_area_px < self.max_area_px:
-            raise ConfigError("detector.min_area_px", self.min_area_px, "0 < min_area_px < max_area_px")
+            raise ConfigError("min_area_px", self.min_area_px, "0 < min_area_px < max_area_px")
 
 
 class BlobDetector:
@@ -71,6 +71,10 @@ class BlobDetector:
         params.filterByConvexity, params.minConvexity = True, cfg.min_convexity
         params.filterByInertia = False
         self._detector = cv2.SimpleBlobDetector.create(params)
+
+    def __reduce__(self) -> tuple[type[BlobDetector], tuple[BlobCfg]]:
+        """OpenCV's part cannot be copied or pickled: it is made anew."""
+        return BlobDetector, (self._cfg,)
 
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> Detections:
         """Detect in the whole frame; with regions, keep what lies in them.

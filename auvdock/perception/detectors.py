@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
-from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from auvdock.core.contracts import Detector
 from auvdock.core.errors import ConfigError
+from auvdock.core.named import find_named
 from auvdock.core.station import ConicalStationCfg
 from auvdock.perception.blob import BlobCfg, BlobDetector
+from auvdock.perception.checked_detector import CheckedDetector
 from auvdock.perception.landing.cores import CoreCfg, CoreDetector
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
@@ -64,18 +64,11 @@ def _configure(cls: type[_T], settings: dict[str, Any]) -> _T:
 
 
 def _foreign(name: str, settings: dict[str, Any]) -> Detector:
-    module_name, _, attribute = name.partition(":")
+    factory = find_named("detector", name)
     try:
-        module = importlib.import_module(module_name)
-    except (ImportError, ValueError) as error:
-        raise ConfigError("detector", name, f"a module that can be imported ({error})") from error
-    factory: Callable[..., Any] | None = getattr(module, attribute, None)
-    if not callable(factory):
-        raise ConfigError("detector", name, f"a class or function that {module_name} has")
-    try:
-        detector = factory(**settings)
+        detector: Any = factory(**settings)
     except TypeError as error:
-        raise ConfigError("detector", name, f"settings that {attribute} takes ({error})") from error
+        raise ConfigError("detector", name, f"settings that {name.partition(':')[2]} takes ({error})") from error
     if not callable(getattr(detector, "detect", None)):
         raise ConfigError("detector", name, "a class with a method detect(frame, regions) -> Detections")
-    return cast(Detector, detector)
+    return CheckedDetector(name, detector)

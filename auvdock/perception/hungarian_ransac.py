@@ -44,9 +44,9 @@ class HungarianRansacCfg:
         """Refuse thresholds without meaning."""
         for name in ("gate_px", "ransac_px"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"hungarian_ransac.{name}", getattr(self, name), "a distance above 0 px")
+                raise ConfigError(name, getattr(self, name), "a distance above 0 px")
         if self.ransac_iterations < 1:
-            raise ConfigError("hungarian_ransac.ransac_iterations", self.ransac_iterations, "1 or more")
+            raise ConfigError("ransac_iterations", self.ransac_iterations, "1 or more")
 
 
 class HungarianRansacAssociation:

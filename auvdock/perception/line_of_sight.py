@@ -46,11 +46,11 @@ class LineOfSightCfg:
     def __post_init__(self) -> None:
         """Refuse thresholds without meaning."""
         if self.min_occurrences < 1:
-            raise ConfigError("line_of_sight.min_occurrences", self.min_occurrences, "1 or more")
+            raise ConfigError("min_occurrences", self.min_occurrences, "1 or more")
         if self.group_size < 2:
-            raise ConfigError("line_of_sight.group_size", self.group_size, "2 or more")
+            raise ConfigError("group_size", self.group_size, "2 or more")
         if not 0.0 < self.loyalty <= 1.0:
-            raise ConfigError("line_of_sight.loyalty", self.loyalty, "a fraction above 0 and up to 1")
+            raise ConfigError("loyalty", self.loyalty, "a fraction above 0 and up to 1")
 
 
 class LineOfSight:

@@ -55,10 +55,10 @@ class PerceptionCfg:
     def __post_init__(self) -> None:
         """Check the association's name; the detector's is checked when it is made."""
         if self.association not in ASSOCIATIONS:
-            raise ConfigError("perception.association", self.association, f"one of {', '.join(ASSOCIATIONS)}")
+            raise ConfigError("association", self.association, f"one of {', '.join(ASSOCIATIONS)}")
         if self.authentication.min_occurrences > self.tracker.window_frames:
             raise ConfigError(
-                "perception.authentication.min_occurrences",
+                "authentication.min_occurrences",
                 self.authentication.min_occurrences,
                 f"at most tracker.window_frames ({self.tracker.window_frames})",
             )

@@ -61,9 +61,9 @@ class PnpCfg:
         """Refuse what no check can use."""
         for name in ("max_reprojection_px", "attitude_sigma_deg", "max_attitude_error_deg"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"pnp.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
         if self.attitude_prior_sigma_deg < 0.0:
-            raise ConfigError("pnp.attitude_prior_sigma_deg", self.attitude_prior_sigma_deg, "0 or more")
+            raise ConfigError("attitude_prior_sigma_deg", self.attitude_prior_sigma_deg, "0 or more")
 
 
 class PnpSolution(NamedTuple):

@@ -44,7 +44,7 @@ class FacingHeading:
 
     def __init__(self, camera: Camera) -> None:
         """Keep the mounting."""
-        self._body_camera = camera.T_body_camera[:3, :3]
+        self._body_camera = camera.T_body_camera[:3, :3].copy()
         self.reset()
 
     def reset(self) -> None:

@@ -55,10 +55,10 @@ class ThresholdCfg:
         """Refuse thresholds without meaning."""
         for name in ("noise_factor", "min_contrast", "flux_disc_rad"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"detector.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
         for name in ("min_area_px", "background_px", "max_lights"):
             if getattr(self, name) < 1:
-                raise ConfigError(f"detector.{name}", getattr(self, name), "1 or more")
+                raise ConfigError(name, getattr(self, name), "1 or more")
 
 
 @dataclass(frozen=True)

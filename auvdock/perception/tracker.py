@@ -7,6 +7,7 @@ covariance, so a track's 4 × 4 covariance is three numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -34,6 +35,8 @@ _ROOM = 32
 """Tracks that there is room for at first."""
 _MARGIN = 0.1
 """Share of the image by which a track may lie outside it."""
+_LABEL_VIEWS = ("track_id", "class_id", "beacon_id", "missed", "hits", "detection")
+_VIEWS = ("numbers", "labels", "state", "covariance", "history", *_LABEL_VIEWS)
 
 
 @dataclass(frozen=True)
@@ -61,13 +64,13 @@ class TrackerCfg:
         """Refuse what no filter can use."""
         for name in ("pixel_sigma_px", "acceleration_px_s2", "initial_speed_px_s", "gate_sigmas"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"tracker.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
         for name in ("confirm_hits", "window_frames"):
             if getattr(self, name) < 1:
-                raise ConfigError(f"tracker.{name}", getattr(self, name), "1 or more")
+                raise ConfigError(name, getattr(self, name), "1 or more")
         for name in ("max_predicted_frames", "max_tentative_frames"):
             if getattr(self, name) < 0:
-                raise ConfigError(f"tracker.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 class LightTracker:
@@ -114,6 +117,15 @@ class LightTracker:
         self._bind(0)
         self._next_id = 0
         self._slot = 0
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the views: a copy of a view no longer follows its table."""
+        return {name: value for name, value in self.__dict__.items() if name not in _VIEWS}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the views anew, of the copied tables."""
+        self.__dict__.update(state)
+        self._bind(self._count)
 
     def __len__(self) -> int:
         """Number of tracks alive."""

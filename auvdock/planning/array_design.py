@@ -39,17 +39,17 @@ class ArrayBounds:
     def __post_init__(self) -> None:
         """Refuse bounds that hold no layout."""
         if not 4 <= self.lights <= 16:
-            raise ConfigError("bounds.lights", self.lights, "4 to 16 lights")
+            raise ConfigError("lights", self.lights, "4 to 16 lights")
         for name in ("radius_m", "tilt_deg", "beam_deg"):
             low, high = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
             if not (math.isfinite(low) and math.isfinite(high) and low <= high):
-                raise ConfigError(f"bounds.min_{name}", low, f"a number of at most max_{name} ({high:g})")
+                raise ConfigError(f"min_{name}", low, f"a number of at most max_{name} ({high:g})")
         if not self.min_radius_m > 0.0:
-            raise ConfigError("bounds.min_radius_m", self.min_radius_m, "a length above 0 m")
+            raise ConfigError("min_radius_m", self.min_radius_m, "a length above 0 m")
         if not 1.0 <= self.min_beam_deg <= self.max_beam_deg <= 179.0:
-            raise ConfigError("bounds.min_beam_deg", self.min_beam_deg, "beam angles of 1 to 179 degrees")
+            raise ConfigError("min_beam_deg", self.min_beam_deg, "beam angles of 1 to 179 degrees")
         if self.min_gap_m * self.lights > 2.0 * math.pi * self.max_radius_m:
-            raise ConfigError("bounds.min_gap_m", self.min_gap_m, f"less: {self.lights} lights do not fit on the rim")
+            raise ConfigError("min_gap_m", self.min_gap_m, f"less: {self.lights} lights do not fit on the rim")
 
 
 @dataclass(frozen=True, eq=False)

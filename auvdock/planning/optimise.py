@@ -57,16 +57,16 @@ class OptimiseCfg:
     def __post_init__(self) -> None:
         """Refuse searches without sense."""
         if self.goal not in GOALS:
-            raise ConfigError("optimise.goal", self.goal, f"one of {', '.join(GOALS)}")
+            raise ConfigError("goal", self.goal, f"one of {', '.join(GOALS)}")
         if not (math.isfinite(self.power_w) and self.power_w > 0.0):
-            raise ConfigError("optimise.power_w", self.power_w, "a power above 0 W")
+            raise ConfigError("power_w", self.power_w, "a power above 0 W")
         for name, least in (("generations", 1), ("population", 5), ("directions", 8), ("ranges", 4)):
             if getattr(self, name) < least:
-                raise ConfigError(f"optimise.{name}", getattr(self, name), f"{least} or more")
+                raise ConfigError(name, getattr(self, name), f"{least} or more")
         if not 5.0 <= self.cone_deg <= 90.0:
-            raise ConfigError("optimise.cone_deg", self.cone_deg, "5 to 90 degrees")
+            raise ConfigError("cone_deg", self.cone_deg, "5 to 90 degrees")
         if not self.reach_m > 1.0:
-            raise ConfigError("optimise.reach_m", self.reach_m, "more than 1 m")
+            raise ConfigError("reach_m", self.reach_m, "more than 1 m")
 
 
 @dataclass(frozen=True, eq=False)

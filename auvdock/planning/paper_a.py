@@ -79,10 +79,10 @@ class PaperALightCfg:
         """Refuse what gives no light."""
         for name in ("intensity", "reference_distance_m", "diffusion_exponent", "threshold"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(f"paper_a.{name}", getattr(self, name), "a finite number above 0")
+                raise ConfigError(name, getattr(self, name), "a finite number above 0")
         for name in ("absorption_per_m", "scattering_per_m", "concentration_kg_m3"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(f"paper_a.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 @dataclass(frozen=True)

@@ -44,9 +44,9 @@ class PlanCfg:
     def __post_init__(self) -> None:
         """Refuse what gives no region."""
         if self.min_lights < 1:
-            raise ConfigError("plan.min_lights", self.min_lights, "1 or more")
+            raise ConfigError("min_lights", self.min_lights, "1 or more")
         if not 16 <= self.resolution <= 400:
-            raise ConfigError("plan.resolution", self.resolution, "16 to 400 voxels")
+            raise ConfigError("resolution", self.resolution, "16 to 400 voxels")
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def make_detectability(layout: BeaconLayout, cfg: PlanCfg) -> Detectability:
         water = with_attenuation(water, cfg.attenuation_per_m)
     count = len(layout.indices("array"))
     if cfg.min_lights > count:
-        raise ConfigError("plan.min_lights", cfg.min_lights, f"at most {count}, the array's number of lights")
+        raise ConfigError("min_lights", cfg.min_lights, f"at most {count}, the array's number of lights")
     sight = Sight(forward_camera(cfg.camera), water, layout, cfg.imaging)
     return Detectability(sight, load_detection_model("threshold"))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, check_shape
 from auvdock.core.vehicle import VehicleCfg
 
 __all__ = ["Actuators"]
@@ -50,9 +50,8 @@ class Actuators:
         """A command as an array (n,).
 
         Raises:
-            ValueError: wrong length.
+            ValueError: another shape.
         """
         values = np.asarray(command, dtype=np.float64)
-        if values.shape != self.state.shape:
-            raise ValueError(f"command has {values.size} values, expected {len(self.state)}")
+        check_shape("command", values, self.state.shape)
         return values

@@ -12,26 +12,35 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from auvdock.core.compiled import external
-from auvdock.core.errors import ConfigError
 
-__all__ = ["MjData", "MjModel", "addresses", "c_function", "mujoco"]
+__all__ = ["GL_REFUSAL", "MjData", "MjModel", "addresses", "c_function", "mujoco"]
 
 
-def _load() -> Any:  # noqa: ANN401
+def _load() -> tuple[Any, str | None]:
+    """MuJoCo, and why the OpenGL library that MUJOCO_GL names cannot be used; physics needs none."""
     try:
-        return import_module("mujoco")
+        return import_module("mujoco"), None
     except Exception as error:
-        # MuJoCo loads the OpenGL library that MUJOCO_GL names while it is imported, and fails there in many ways.
+        # MuJoCo loads that library while it is imported, and fails there in many ways.
         name = os.environ.get("MUJOCO_GL")
         if not name:
             raise
-        remedy = (
-            "egl (install libegl1 libgl1-mesa-dri), osmesa (install libosmesa6), or disable with --fidelity beacons"
+        os.environ["MUJOCO_GL"] = "disable"
+        try:
+            module = import_module("mujoco")
+        finally:
+            os.environ["MUJOCO_GL"] = name
+        why = (str(error) or repr(error)).splitlines()[0]
+        return module, (
+            f"MUJOCO_GL: {name!r} cannot be used ({why}); give egl (install libegl1 libgl1-mesa-dri), osmesa (install "
+            "libosmesa6), or leave it unset"
         )
-        raise ConfigError("MUJOCO_GL", name, f"one that loads here: {remedy}") from error
 
 
-mujoco: Any = _load()
+_loaded = _load()
+mujoco: Any = _loaded[0]
+GL_REFUSAL = _loaded[1]
+"""Why nothing can be rendered with MUJOCO_GL as it is; None if its value can be used or there is none."""
 MjModel: TypeAlias = Any
 """`mujoco.MjModel`."""
 MjData: TypeAlias = Any

@@ -36,12 +36,12 @@ class CurrentCfg:
         """Refuse what no water does."""
         for name in ("speed_m_s", "gust_std_m_s"):
             if not 0.0 <= getattr(self, name) <= 5.0:
-                raise ConfigError(f"world.sim.current.{name}", getattr(self, name), "a speed of 0 to 5 m/s")
+                raise ConfigError(name, getattr(self, name), "a speed of 0 to 5 m/s")
         for name in ("direction_deg", "shear_per_m"):
             if not math.isfinite(getattr(self, name)):
-                raise ConfigError(f"world.sim.current.{name}", getattr(self, name), "a finite number")
+                raise ConfigError(name, getattr(self, name), "a finite number")
         if not self.gust_time_constant_s > 0.0:
-            raise ConfigError("world.sim.current.gust_time_constant_s", self.gust_time_constant_s, "a time above 0 s")
+            raise ConfigError("gust_time_constant_s", self.gust_time_constant_s, "a time above 0 s")
 
 
 class Ocean:

@@ -48,7 +48,7 @@ class SensorCfg:
         """Refuse negative deviations."""
         for name, value in vars(self).items():
             if not (math.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"world.sim.sensors.{name}", value, "0 or more")
+                raise ConfigError(name, value, "0 or more")
 
 
 _BLOCK = 64

@@ -46,7 +46,7 @@ class SimCfg:
     def __post_init__(self) -> None:
         """Contacts need some 100 Hz; beyond 2000 Hz nothing is gained."""
         if not 100.0 <= self.physics_hz <= 2000.0:
-            raise ConfigError("world.sim.physics_hz", self.physics_hz, "a rate of 100 to 2000 Hz")
+            raise ConfigError("physics_hz", self.physics_hz, "a rate of 100 to 2000 Hz")
 
 
 class HistoryEntry(NamedTuple):

@@ -53,11 +53,11 @@ class LandingGuidanceCfg:
         """All are positive, and the descent slows down."""
         for name, value in vars(self).items():
             if not value > 0.0:
-                raise ConfigError(f"control.guidance.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
         if self.touchdown_sink_m_s > self.max_sink_m_s:
-            raise ConfigError("control.guidance.touchdown_sink_m_s", self.touchdown_sink_m_s, "at most max_sink_m_s")
+            raise ConfigError("touchdown_sink_m_s", self.touchdown_sink_m_s, "at most max_sink_m_s")
         if self.corridor_m > self.max_corridor_m:
-            raise ConfigError("control.guidance.corridor_m", self.corridor_m, "at most max_corridor_m")
+            raise ConfigError("corridor_m", self.corridor_m, "at most max_corridor_m")
 
 
 class Place(NamedTuple):

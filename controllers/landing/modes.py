@@ -123,13 +123,11 @@ class LandingModeCfg:
         """All are positive; touchdown, commitment and standoff lie in this order."""
         for name, value in vars(self).items():
             if not value > 0:
-                raise ConfigError(f"control.modes.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
         if not self.touchdown_height_m < self.commit_height_m < self.standoff_m:
-            raise ConfigError(
-                "control.modes.commit_height_m", self.commit_height_m, "touchdown_height_m < it < standoff_m"
-            )
+            raise ConfigError("commit_height_m", self.commit_height_m, "touchdown_height_m < it < standoff_m")
         if not self.brief_s < self.pose_lost_s:
-            raise ConfigError("control.modes.brief_s", self.brief_s, "less than pose_lost_s")
+            raise ConfigError("brief_s", self.brief_s, "less than pose_lost_s")
 
 
 class LandingFacts(NamedTuple):

@@ -38,7 +38,7 @@ class SpiralCfg:
         """All are positive; the wait may be none."""
         for name, value in vars(self).items():
             if not (value > 0.0 or (name == "settle_s" and value == 0.0)):
-                raise ConfigError(f"control.search.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
 
 
 def spiral_pass(time_s: float, cfg: SpiralCfg) -> tuple[bool, float]:

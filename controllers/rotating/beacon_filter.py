@@ -63,9 +63,9 @@ class BeaconFilterCfg:
         """All are positive and the ranges in order."""
         for name, value in vars(self).items():
             if not value > 0:
-                raise ConfigError(f"control.beacon_filter.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
         if self.min_range_m >= self.max_range_m:
-            raise ConfigError("control.beacon_filter.min_range_m", self.min_range_m, "less than max_range_m")
+            raise ConfigError("min_range_m", self.min_range_m, "less than max_range_m")
 
 
 class Sighting(NamedTuple):

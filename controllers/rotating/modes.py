@@ -59,7 +59,7 @@ class RotatingModeCfg:
         """All are positive."""
         for name, value in vars(self).items():
             if not value > 0:
-                raise ConfigError(f"control.rotating.modes.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
 
 
 class RotatingFacts(NamedTuple):

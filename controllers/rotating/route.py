@@ -35,9 +35,9 @@ class RouteCfg:
         """All but the centre are positive, and the gate lies outside the disc."""
         for name in ("radius_m", "gate_m", "cone_rad", "push", "side_from_rad"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"control.route.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
         if self.gate_m - self.centre_x_m <= self.radius_m:
-            raise ConfigError("control.route.gate_m", self.gate_m, "a place outside the disc about centre_x_m")
+            raise ConfigError("gate_m", self.gate_m, "a place outside the disc about centre_x_m")
 
 
 class Leg(NamedTuple):

@@ -46,7 +46,7 @@ class LookAroundCfg:
         for name, value in vars(self).items():
             low = 0.0 if name in ("settle_s", "believed_s", "depth_step_m", "hold_score") else 1e-6
             if not (math.isfinite(value) and value >= low):
-                raise ConfigError(f"control.rotating.look.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class CourseCfg:
         """All are positive."""
         for name, value in vars(self).items():
             if not value > 0.0:
-                raise ConfigError(f"control.rotating.course.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
 
 
 def look_around(

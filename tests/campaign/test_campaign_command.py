@@ -107,7 +107,7 @@ def test_dock_alone_tells_what_it_wants(capsys):
     [
         (["--current", "0:1"], "current", None),
         (["--current", "0:0.5:0"], "current", "2 or more"),
-        (["--current", "fast"], "speed_m_s", "float"),
+        (["--current", "fast"], "current", "finite numbers"),
         (["--attenuation", "1:0:3"], "attenuation", "low below high"),
         (["--flicker", "none,awful"], "flicker", "moderate"),
         (["--axis", "world.start.heading_deg"], "axis", "NAME=RANGE"),

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from auvdock.campaign.axes import AxisCfg, parse_axis
+from auvdock.campaign.axes import AxisCfg
+from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.config import STATIONS, CampaignCfg
 from auvdock.campaign.plan import Plan
 from auvdock.campaign.store import read_table
@@ -56,8 +57,8 @@ def test_pilots_are_an_axis_and_a_flag(tmp_path, capsys):
 
 
 def test_a_name_with_a_colon_is_no_range():
-    assert parse_axis("controller", "a.b:C,own") == AxisCfg("controller", ("a.b:C", "own"))
-    assert parse_axis("detector", "a.b:C") == AxisCfg("detector", ("a.b:C",))
+    assert parse_axis("controller", "a.b:C,own", str) == AxisCfg("controller", ("a.b:C", "own"))
+    assert parse_axis("detector", "a.b:C", str) == AxisCfg("detector", ("a.b:C",))
 
 
 @pytest.mark.parametrize("station", STATIONS)

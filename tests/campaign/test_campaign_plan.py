@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auvdock.campaign.axes import AxisCfg, parse_axis
-from auvdock.campaign.config import CampaignCfg, campaign_from_plain, load_campaign
+from auvdock.campaign.axes import AxisCfg
+from auvdock.campaign.axis_text import parse_axis
+from auvdock.campaign.config import CampaignCfg, campaign_from_plain
+from auvdock.campaign.files import load_campaign
 from auvdock.campaign.plan import Plan
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import to_plain
@@ -24,17 +26,17 @@ def points(cfg, name):
 
 
 def test_a_range_is_low_high_count():
-    assert parse_axis("current", "0:0.5:6").grid == (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
-    assert parse_axis("attenuation", "0.2:1.2:6").grid == (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
-    assert not parse_axis("current", "0:0.5").is_grid
-    assert parse_axis("flicker", "none,severe").grid == ("none", "severe")
-    assert parse_axis("current", "0.3").grid == (0.3,)
+    assert parse_axis("current", "0:0.5:6", float).grid == (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+    assert parse_axis("attenuation", "0.2:1.2:6", float).grid == (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
+    assert not parse_axis("current", "0:0.5", float).is_grid
+    assert parse_axis("flicker", "none,severe", str).grid == ("none", "severe")
+    assert parse_axis("current", "0.3", float).grid == (0.3,)
 
 
 @pytest.mark.parametrize("text", ["", "0:1:2:3", "1:0:3", "0:1:0", "0:1:1", "a:b", "0:nan:3", "0:inf", "1,,2", "nan"])
 def test_ranges_that_are_none_are_refused(text):
     with pytest.raises(ConfigError) as caught:
-        parse_axis("current", text)
+        parse_axis("current", text, float)
     assert "current" in caught.value.field
 
 

@@ -96,11 +96,11 @@ def test_no_distortion_is_no_distortion():
 @pytest.mark.parametrize(
     ("change", "field"),
     [
-        ({"width_px": 8}, "world.camera.width_px"),
-        ({"rate_hz": 0.0}, "world.camera.rate_hz"),
-        ({"focal_length_m": -1.0}, "world.camera.focal_length_m"),
-        ({"principal_point_px": [900.0, 10.0]}, "world.camera.principal_point_px"),
-        ({"radial": [-40000.0, 0.0, 0.0]}, "world.camera.radial"),
+        ({"width_px": 8}, "width_px"),
+        ({"rate_hz": 0.0}, "rate_hz"),
+        ({"focal_length_m": -1.0}, "focal_length_m"),
+        ({"principal_point_px": [900.0, 10.0]}, "principal_point_px"),
+        ({"radial": [-40000.0, 0.0, 0.0]}, "radial"),
         ({"focal_lenght_m": 0.007}, "focal_lenght_m"),
     ],
 )

@@ -1,6 +1,6 @@
 import numpy as np
 
-from auvdock.core.compiled import cache_folder, compiled, compiling
+from auvdock.core.compiled import cache_folders, compiled, compiling
 
 
 def count_above(values, level):
@@ -30,7 +30,7 @@ def test_compiles_where_no_cache_can_be_kept():
     exec("def twice(x):\n    return 2 * x", space)
     twice = compiled(space["twice"])
     assert twice(21) == 42
-    assert cache_folder(twice) is None
+    assert cache_folders(twice) == ()
 
 
 def test_tells_once_that_it_compiles():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pytest
 
 from auvdock.assets import asset, asset_names
-from auvdock.core.errors import ConfigError
+from auvdock.core.errors import ConfigError, located
 from auvdock.core.strict import from_mapping, load_toml, merge, read_toml, to_plain
 
 
@@ -85,3 +85,18 @@ def test_errors_survive_pickling():
     copy = pickle.loads(pickle.dumps(error))
     assert str(copy) == str(error)
     assert copy.field == "field"
+
+
+def test_an_error_is_located_once_however_deep_it_was_raised():
+    for field in ("lateral_m", "start.lateral_m", "world.start.lateral_m"):
+        with pytest.raises(ConfigError) as caught, located("world."), located("" if "." in field else "start."):
+            raise ConfigError(field, -1.0, "0 or more")
+        assert caught.value.field == "world.start.lateral_m"
+        assert str(caught.value).startswith("world.start.lateral_m: -1.0")
+
+
+def test_numbers_too_long_to_write_and_lists_too_deep_to_read_are_refused(tmp_path):
+    for text in ("count = " + "9" * 5000, "count = 0x" + "f" * 5000, "items = " + "[" * 5000 + "]" * 5000):
+        (tmp_path / "long.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(ConfigError):
+            load_toml(Outer, tmp_path / "long.toml")

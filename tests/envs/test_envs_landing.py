@@ -48,7 +48,8 @@ def assert_equal(first: Any, second: Any) -> None:
 @pytest.mark.parametrize("observation", ["state", "pose"])
 @pytest.mark.parametrize("vehicle", ["bluerov2_heavy", "remus_hybrid"])
 def test_environment_checker_is_content(observation: str, vehicle: str) -> None:
-    check_env(LandingEnv(LandingWorldCfg(sim=SimCfg(vehicle=vehicle)), observation=observation), skip_render_check=True)
+    cfg = LandingWorldCfg(fidelity="beacons", sim=SimCfg(vehicle=vehicle))
+    check_env(LandingEnv(cfg, observation=observation), skip_render_check=True)
 
 
 @pytest.mark.render

@@ -162,11 +162,11 @@ def test_surfaces_in_turbid_water_are_veiled_by_the_lamp():
 @pytest.mark.parametrize(
     ("change", "field"),
     [
-        ({"power_w": -1.0}, "world.lamp.power_w"),
-        ({"efficiency": 0.0}, "world.lamp.efficiency"),
-        ({"beam_angle_deg": 180.0}, "world.lamp.beam_angle_deg"),
-        ({"band_shares": [0.9, 0.9, 0.0]}, "world.lamp.band_shares"),
-        ({"positions_m": []}, "world.lamp.positions_m"),
+        ({"power_w": -1.0}, "power_w"),
+        ({"efficiency": 0.0}, "efficiency"),
+        ({"beam_angle_deg": 180.0}, "beam_angle_deg"),
+        ({"band_shares": [0.9, 0.9, 0.0]}, "band_shares"),
+        ({"positions_m": []}, "positions_m"),
         ({"power": 3.0}, "power"),
     ],
 )

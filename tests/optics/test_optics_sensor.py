@@ -83,14 +83,14 @@ def test_same_stream_same_bits():
 @pytest.mark.parametrize(
     ("make", "field"),
     [
-        (lambda: ImagingCfg(encoding="log"), "imaging.encoding"),
-        (lambda: ImagingCfg(full_well_e=0.0), "imaging.full_well_e"),
-        (lambda: ImagingCfg(lamp_spill=1.5), "imaging.lamp_spill"),
-        (lambda: ImagingCfg(read_noise_e=float("nan")), "imaging.read_noise_e"),
-        (lambda: ExposureCfg(saturated_share=0.0), "imaging.exposure.saturated_share"),
-        (lambda: ExposureCfg(max_step=1.0), "imaging.exposure.max_step"),
-        (lambda: ExposureCfg(min_s=1.0), "imaging.exposure.min_s"),
-        (lambda: ExposureCfg(max_gain=0.5), "imaging.exposure.max_gain"),
+        (lambda: ImagingCfg(encoding="log"), "encoding"),
+        (lambda: ImagingCfg(full_well_e=0.0), "full_well_e"),
+        (lambda: ImagingCfg(lamp_spill=1.5), "lamp_spill"),
+        (lambda: ImagingCfg(read_noise_e=float("nan")), "read_noise_e"),
+        (lambda: ExposureCfg(saturated_share=0.0), "saturated_share"),
+        (lambda: ExposureCfg(max_step=1.0), "max_step"),
+        (lambda: ExposureCfg(min_s=1.0), "min_s"),
+        (lambda: ExposureCfg(max_gain=0.5), "max_gain"),
     ],
 )
 def test_impossible_settings_are_refused(make, field):

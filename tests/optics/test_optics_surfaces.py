@@ -6,7 +6,7 @@ import pytest
 from optics_scene import DEPTH_M, Scene, fixed_exposure, imager, one_lamp, pose, station_layout, wall_scene
 
 from auvdock.core.errors import GraphicsError
-from auvdock.optics import gl
+from auvdock.optics import gl_driver
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_preset
 from auvdock.optics.water import load_water
 from auvdock.sim.mj import mujoco
@@ -110,10 +110,10 @@ def test_close_and_pickle_leave_no_context_behind():
 
 
 def test_nothing_is_rendered_before_a_surface_can_be_seen(monkeypatch):
-    def refuse(width, height):
+    def refuse(maker, width, height):
         raise RuntimeError("no display")
 
-    monkeypatch.setattr(gl, "offscreen_context", refuse)
+    monkeypatch.setattr(gl_driver, "_make", refuse)
     # Lake water at night: 60 m away nothing of the wall arrives.
     unit = imager(one_lamp(), load_water("lake"), SHOW, NuisanceCfg(), wall_scene(60.0))
     assert unit.capture(pose(60.0), 0.0).image.shape == (360, 640, 3)

@@ -75,8 +75,8 @@ def test_attenuation_of_a_water_without_scattering():
 @pytest.mark.parametrize("c_450", [-1.0, math.nan, math.inf, 0.049])
 def test_impossible_attenuation_is_refused(c_450):
     with pytest.raises(ConfigError) as caught:
-        with_attenuation(load_water("pool"), c_450, "world.attenuation_per_m")
-    assert caught.value.field == "world.attenuation_per_m"
+        with_attenuation(load_water("pool"), c_450)
+    assert caught.value.field == "attenuation_per_m"
     assert "0.05" in caught.value.remedy
 
 

@@ -1,6 +1,7 @@
 """`auvdock plan` and `auvdock reproduce guidance-*`: what they print and what they refuse."""
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,10 @@ STATION = str(Path(__file__).resolve().parents[2] / "assets" / "stations" / "con
 
 
 def test_plan_prints_one_object_and_writes_its_files(tmp_path, capsys):
-    assert main(["plan", STATION, "--water", "lake", "--resolution", "16", "--out", str(tmp_path), "--json"]) == 0
+    station = tmp_path / "my station.toml"
+    station.write_text(Path(STATION).read_text(encoding="utf-8"), encoding="utf-8")
+    words = ["plan", str(station), "--water", "lake", "--attenuation", "0.8", "--resolution", "16"]
+    assert main([*words, "--out", str(tmp_path), "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["volume_m3"] > 10.0 * report["discretisation_error_m3"]
     assert 0.0 < report["near_m"] < report["range_m"]
@@ -21,6 +25,11 @@ def test_plan_prints_one_object_and_writes_its_files(tmp_path, capsys):
     for name in ("sections.png", "region.rrd"):
         assert (tmp_path / name).stat().st_size > 5000
     assert (tmp_path / "sections.png").read_bytes().startswith(b"\x89PNG")
+    auvdock, *command = shlex.split(report["fly_it"])
+    assert auvdock == "auvdock"
+    assert main([*command, "--fidelity", "beacons", "--world.limits.max-time-s", "0.1", "--json"]) == 1
+    world = json.loads(capsys.readouterr().out)["config"]["world"]
+    assert (world["water"], world["attenuation_per_m"]) == ("lake", 0.8)
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ class AttitudeCfg:
         """Refuse what no filter can use."""
         for name, value in vars(self).items():
             if not (math.isfinite(value) and value > 0.0):
-                raise ConfigError(f"perception.attitude.{name}", value, "an angle above 0")
+                raise ConfigError(name, value, "an angle above 0")
 
 
 @dataclass(frozen=True)
@@ -60,14 +60,14 @@ class LightLevelCfg:
         """Refuse settings without meaning."""
         for name in ("centre_sigma_px", "max_reprojection_px", "gate_px"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"perception.lights.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
         for name in ("centre_sigma_widths", "max_height_error_m"):
             if not getattr(self, name) >= 0.0:
-                raise ConfigError(f"perception.lights.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
         if self.max_lights_n < 3:
-            raise ConfigError("perception.lights.max_lights_n", self.max_lights_n, "3 or more")
+            raise ConfigError("max_lights_n", self.max_lights_n, "3 or more")
         if self.confirm_n < 1:
-            raise ConfigError("perception.lights.confirm_n", self.confirm_n, "1 or more")
+            raise ConfigError("confirm_n", self.confirm_n, "1 or more")
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,11 @@ class TagLevelCfg:
     def __post_init__(self) -> None:
         """Refuse settings without meaning."""
         if not self.corner_sigma_px >= 0.0:
-            raise ConfigError("perception.tag.corner_sigma_px", self.corner_sigma_px, "0 or more")
+            raise ConfigError("corner_sigma_px", self.corner_sigma_px, "0 or more")
         if not self.max_reprojection_px > 0.0:
-            raise ConfigError("perception.tag.max_reprojection_px", self.max_reprojection_px, "a value above 0")
+            raise ConfigError("max_reprojection_px", self.max_reprojection_px, "a value above 0")
         if self.whole_frame_every_n < 1:
-            raise ConfigError("perception.tag.whole_frame_every_n", self.whole_frame_every_n, "1 or more")
+            raise ConfigError("whole_frame_every_n", self.whole_frame_every_n, "1 or more")
 
 
 @dataclass(frozen=True)
@@ -114,12 +114,12 @@ class FilterCfg:
         """Refuse what no filter can use."""
         for name in ("velocity_noise_m_s", "gyro_noise_rad_s", "gate"):
             if not getattr(self, name) > 0.0:
-                raise ConfigError(f"perception.filter.{name}", getattr(self, name), "a value above 0")
+                raise ConfigError(name, getattr(self, name), "a value above 0")
         for name in ("velocity_scale_error", "gyro_bias_rad_s"):
             if not getattr(self, name) >= 0.0:
-                raise ConfigError(f"perception.filter.{name}", getattr(self, name), "0 or more")
+                raise ConfigError(name, getattr(self, name), "0 or more")
         if self.reset_after_n < 1:
-            raise ConfigError("perception.filter.reset_after_n", self.reset_after_n, "1 or more")
+            raise ConfigError("reset_after_n", self.reset_after_n, "1 or more")
 
 
 @dataclass(frozen=True)
@@ -151,9 +151,9 @@ class LandingPerceptionCfg:
     def __post_init__(self) -> None:
         """Check names; the detectors' are checked when they are made."""
         if self.levels not in LEVELS:
-            raise ConfigError("perception.levels", self.levels, f"one of {', '.join(LEVELS)}")
+            raise ConfigError("levels", self.levels, f"one of {', '.join(LEVELS)}")
         if self.fusion not in FUSIONS:
-            raise ConfigError("perception.fusion", self.fusion, f"one of {', '.join(FUSIONS)}")
+            raise ConfigError("fusion", self.fusion, f"one of {', '.join(FUSIONS)}")
         for name in ("max_missed_lights_n", "max_missed_tag_n"):
             if getattr(self, name) < 1:
-                raise ConfigError(f"perception.{name}", getattr(self, name), "1 or more")
+                raise ConfigError(name, getattr(self, name), "1 or more")

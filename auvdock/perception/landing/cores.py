@@ -52,15 +52,15 @@ class CoreCfg:
         """Refuse cuts without meaning."""
         falling = all(a > b for a, b in zip(self.levels, self.levels[1:], strict=False))
         if not self.levels or not falling or not 0.0 < self.levels[-1] or not self.levels[0] < 1.0:
-            raise ConfigError("detector.levels", self.levels, "falling shares between 0 and 1")
+            raise ConfigError("levels", self.levels, "falling shares between 0 and 1")
         if not 0.0 < self.prominence < 1.0:
-            raise ConfigError("detector.prominence", self.prominence, "a share between 0 and 1")
+            raise ConfigError("prominence", self.prominence, "a share between 0 and 1")
         for name in ("min_contrast", "max_aspect"):
             if not getattr(self, name) >= 1.0:
-                raise ConfigError(f"detector.{name}", getattr(self, name), "1 or more")
+                raise ConfigError(name, getattr(self, name), "1 or more")
         for name in ("min_area_px", "max_lights"):
             if getattr(self, name) < 1:
-                raise ConfigError(f"detector.{name}", getattr(self, name), "1 or more")
+                raise ConfigError(name, getattr(self, name), "1 or more")
 
 
 class CoreDetector:

@@ -50,7 +50,7 @@ def make_tag_detector(name: str, numbers: tuple[int, ...] | None = None) -> TagD
         return AprilTagDetector(numbers)
     if name == "contour":
         return ContourTagDetector(numbers)
-    raise ConfigError("perception.tag_detector", name, f"one of {', '.join(TAG_DETECTORS)}")
+    raise ConfigError("tag_detector", name, f"one of {', '.join(TAG_DETECTORS)}")
 
 
 class _Codes:

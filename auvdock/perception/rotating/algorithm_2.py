@@ -37,9 +37,9 @@ class PaperBCfg:
         """Refuse counts that never or always fire."""
         for name in ("min_detections", "max_missed"):
             if getattr(self, name) < 1:
-                raise ConfigError(f"paper_b.{name}", getattr(self, name), "1 or more")
+                raise ConfigError(name, getattr(self, name), "1 or more")
         if not (self.area_weight >= 0.0 and self.shape_weight >= 0.0 and self.area_weight + self.shape_weight > 0.0):
-            raise ConfigError("paper_b.area_weight", self.area_weight, "weights of 0 or more, not both 0")
+            raise ConfigError("area_weight", self.area_weight, "weights of 0 or more, not both 0")
 
 
 class ForwardDetection(NamedTuple):

@@ -76,8 +76,8 @@ class ForwardBeaconCfg:
         """Refuse thresholds without meaning."""
         for name, value in vars(self).items():
             if not (math.isfinite(value) and value > 0):
-                raise ConfigError(f"perception.rotating.{name}", value, "a value above 0")
+                raise ConfigError(name, value, "a value above 0")
         if self.min_turns < 2:
-            raise ConfigError("perception.rotating.min_turns", self.min_turns, "2 or more: one flash is no rotation")
+            raise ConfigError("min_turns", self.min_turns, "2 or more: one flash is no rotation")
         if not self.settle_deg <= self.window_deg < 120.0:
-            raise ConfigError("perception.rotating.window_deg", self.window_deg, "settle_deg or more and below 120")
+            raise ConfigError("window_deg", self.window_deg, "settle_deg or more and below 120")

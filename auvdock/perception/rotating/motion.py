@@ -46,8 +46,8 @@ class CameraMotion:
 
     def __init__(self, camera: Camera) -> None:
         """Keep the mounting."""
-        self._R_body_camera = camera.T_body_camera[:3, :3]
-        self._lever_m = camera.T_body_camera[:3, 3]
+        self._R_body_camera = camera.T_body_camera[:3, :3].copy()
+        self._lever_m = camera.T_body_camera[:3, 3].copy()
         self.reset()
 
     def reset(self) -> None:

@@ -1,0 +1,234 @@
+"""`auvdock reproduce halo`: the halo's table and the flown model against photons, or one water at one range."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from auvdock.cli.parsing import parse
+from auvdock.core.arrays import Array
+from auvdock.core.errors import ConfigError
+from auvdock.experiments.halo_check import (
+    CHECKED_BR,
+    HALF_ANGLES_DEG,
+    PHASES,
+    WELLS_RAD,
+    HaloCheck,
+    check_halo,
+    halo_case,
+)
+from auvdock.experiments.halo_picture import draw_halo
+from auvdock.optics.photons.making import BATCHES, count_photons, make_grid
+from auvdock.optics.photons.phase import load_phase
+from auvdock.optics.photons.table import load_halo, save_halo
+from auvdock.optics.water import load_water, with_attenuation
+from auvdock.planning.pictures import make_folder
+
+__all__ = ["Halo", "run_halo"]
+
+_LEAST_PHOTONS, _MOST_PHOTONS = 1000, 10**9
+_DEFINITION = (
+    "radiance within the half angle about the lamp's direction, integrated over solid angle, of an isotropic lamp, "
+    "over what would arrive by inverse square alone without water"
+)
+
+
+@dataclass(frozen=True)
+class Halo:
+    """Light scattered about a lamp: a table made by single photons against photons sent out afresh, and what is flown.
+
+    With --water and --range it tells what arrives in that one case. With --make-table it makes tables instead.
+    Exit code: 1 if the table is off by more than 10 % where the fresh photons can tell, or they never can; else 0.
+    """
+
+    water: str | None = None
+    """A water preset, for one case."""
+    range_m: Annotated[float | None, tyro.conf.arg(name="range")] = None
+    """Distance to the lamp in m, for one case."""
+    attenuation: float | None = None
+    """Turbidity of that water: c = a + b at 450 nm in 1/m, by more or less scattering; by default the preset's."""
+    wavelength_nm: float = 450.0
+    """Of the lamp in that one case; by default the blue lamps'."""
+    phases: tuple[str, ...] | None = None
+    """Phase functions; by default fournier-forand-0.018, petzold-coastal and petzold-harbour."""
+    photons: int = 1_000_000
+    """Photons for each phase function."""
+    seed: int = 0
+    """Of the photons; those of a check are never those of a table."""
+    make_table: Path | None = None
+    """Folder for a new table of each phase function: PHASE.npz."""
+    out: Path | None = None
+    """Folder for halo.png, the picture."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def run_halo(argv: Sequence[str], prog: str) -> int:
+    """Run the command."""
+    args = parse(Halo, argv, prog)
+    if args.water is not None:
+        return _case(args, args.water)
+    for name in ("range_m", "attenuation"):
+        if getattr(args, name) is not None:
+            raise ConfigError(name.removesuffix("_m"), getattr(args, name), "goes with --water NAME, for one case")
+    if not _LEAST_PHOTONS <= args.photons <= _MOST_PHOTONS:
+        raise ConfigError("photons", args.photons, f"{_LEAST_PHOTONS} to {_MOST_PHOTONS}")
+    if args.seed < 0:
+        raise ConfigError("seed", args.seed, "0 or more")
+    phases = args.phases or PHASES
+    for phase in phases:
+        load_phase(phase)
+        if args.make_table is None:
+            load_halo(phase)
+    folder = args.out if args.make_table is None else args.make_table
+    if folder is not None:
+        make_folder(folder)
+    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
+    checks: list[HaloCheck] = []
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+        for phase in phases:
+            task = progress.add_task(f"photons in {phase}", total=BATCHES)
+            told = partial(progress.advance, task)
+            if args.make_table is not None:
+                grid = make_grid(phase, count_photons(load_phase(phase), args.photons, args.seed, told))
+                save_halo(grid, args.make_table / f"{phase}.npz")
+            else:
+                checks.append(check_halo(phase, args.photons, args.seed, told))
+    if args.make_table is not None:
+        sizes = {phase: (args.make_table / f"{phase}.npz").stat().st_size for phase in phases}
+        _tell(args, {"photons": args.photons, "bytes": sizes}, [f"{p}.npz: {n} bytes" for p, n in sizes.items()])
+        return 0
+    if args.out is not None:
+        draw_halo(args.out / "halo.png", checks)
+    rows = [_verdict(check) for check in checks]
+    if args.json:
+        print(json.dumps({"target": 0.1, "phases": rows}, allow_nan=False))
+    else:
+        _print(rows)
+    return 0 if all(row["judged"] and row["greatest_deviation"] <= 0.1 for row in rows) else 1
+
+
+def _case(args: Halo, name: str) -> int:
+    if args.range_m is None:
+        raise ConfigError("range", None, "--range M, the distance to the lamp")
+    water = load_water(name)
+    if args.attenuation is not None:
+        water = with_attenuation(water, args.attenuation)
+    case = halo_case(water, args.range_m, args.wavelength_nm)
+    halo, wells = _by_angle(case.halo), _by_angle(case.wells)
+    plain = {
+        "water": name,
+        "range_m": args.range_m,
+        "attenuation_per_m": water.attenuation[0],
+        "wavelength_nm": args.wavelength_nm,
+        "absorption_per_m": case.absorption_per_m,
+        "scattering_per_m": case.scattering_per_m,
+        "scattering_depth": case.scattering_depth,
+        "phase_function": case.phase,
+        "definition": _DEFINITION,
+        "within": _by_angle(case.core + case.halo),
+        "core": case.core,
+        "halo_within": halo,
+        "halo_standard_error": _by_angle(case.error),
+        "flown_today": {
+            "model": "Wells 1973",
+            "scattering_angle_rad": water.scattering_angle_rad,
+            "within": _by_angle(case.core + case.wells),
+            "halo_within": wells,
+        },
+    }
+    if args.json:
+        print(json.dumps(plain, allow_nan=False))
+        return 0
+    console = Console()
+    console.print(
+        f"{name} at {args.range_m:g} m, {args.wavelength_nm:g} nm: a = {case.absorption_per_m:.3g} 1/m, "
+        f"b = {case.scattering_per_m:.3g} 1/m, b r = {case.scattering_depth:.3g}, {case.phase}; "
+        f"unscattered {case.core:.3g}",
+        highlight=False,
+    )
+    table = Table(title="light arriving within a half angle about the lamp", title_justify="left")
+    for column in ("half angle", "all", "scattered", "± %", "scattered, Wells", "Wells / photons"):
+        table.add_column(column, justify="right")
+    for i, degrees in enumerate(HALF_ANGLES_DEG):
+        table.add_row(
+            f"{degrees:g}°",
+            f"{case.core + case.halo[i]:.3g}",
+            f"{case.halo[i]:.3g}",
+            f"{100.0 * case.error[i]:.1f}",
+            f"{case.wells[i]:.3g}",
+            f"{case.wells[i] / case.halo[i]:.2f}",
+        )
+    console.print(table)
+    console.print(f"{_DEFINITION}; the simulator flies Wells' function (1973) today", highlight=False)
+    return 0
+
+
+def _by_angle(values: Array) -> dict[str, float]:
+    return {f"{degrees:g}": float(value) for degrees, value in zip(HALF_ANGLES_DEG, values, strict=True)}
+
+
+def _tell(args: Halo, plain: dict[str, Any], lines: Sequence[str]) -> None:
+    if args.json:
+        print(json.dumps(plain, allow_nan=False))
+    else:
+        print("\n".join(lines))
+
+
+def _verdict(check: HaloCheck) -> dict[str, Any]:
+    judged = check.judged
+    off = np.abs(check.ratio - 1.0)
+    wells = check.wells[:, :, None, :] / check.fresh
+    return {
+        "phase": check.phase,
+        "photons": check.photons,
+        "readings": judged.size,
+        "judged": int(judged.sum()),
+        "within_10_percent": int((off[judged] <= 0.1).sum()),
+        "greatest_deviation": float(off[judged].max(initial=0.0)),
+        "rms_deviation": float(np.sqrt(np.mean(off[judged] ** 2))) if judged.any() else 0.0,
+        "greatest_table_error": float(check.table_error.max()),
+        "table_over_photons": [
+            {"scattering_depth": br, "least": float(ratio[known].min()), "most": float(ratio[known].max())}
+            for br, ratio, known in zip(CHECKED_BR, check.ratio, judged, strict=True)
+            if known.any()
+        ],
+        "wells_over_photons": [
+            {"scattering_angle_rad": theta0, "least": float(w[judged].min()), "most": float(w[judged].max())}
+            for theta0, w in zip(WELLS_RAD, wells, strict=True)
+            if judged.any()
+        ],
+    }
+
+
+def _print(rows: Sequence[dict[str, Any]]) -> None:
+    console = Console()
+    title = "halo within 0.2° to 40°, b r 0.5 to 20, a/b 0.05 to 1: table over fresh photons"
+    table = Table(title=title, title_justify="left")
+    columns = ("phase function", "readings", "judged", "within 10 %", "greatest", "rms", "table's error up to")
+    for name in columns:
+        table.add_column(name, justify="left" if name == columns[0] else "right")
+    for row in rows:
+        shares = [row[name] for name in ("greatest_deviation", "rms_deviation", "greatest_table_error")]
+        counts = [str(row[name]) for name in ("readings", "judged", "within_10_percent")]
+        table.add_row(row["phase"], *counts, *(f"{100 * value:.1f} %" for value in shares))
+    console.print(table)
+    title = "Wells' function, which is flown today, over fresh photons: least to most"
+    table = Table(title=title, title_justify="left")
+    table.add_column("phase function")
+    for theta0 in WELLS_RAD:
+        table.add_column(f"θ0 = {theta0:g} rad", justify="right")
+    for row in rows:
+        table.add_row(row["phase"], *(f"{w['least']:.2f} to {w['most']:.2f}" for w in row["wells_over_photons"]))
+    console.print(table)
+    console.print("judged: where three standard errors of the fresh photons are 10 % or less", highlight=False)

@@ -1,0 +1,99 @@
+"""The arguments that all environments take, and how they change a world's configuration."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from auvdock.core.errors import ConfigError
+from auvdock.core.strict import merge
+from auvdock.envs.config import StartCfg, WorldCfg
+from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
+from auvdock.envs.reward import RewardCfg
+
+__all__ = ["OBSERVATIONS", "check_options", "reward_settings", "world_settings"]
+
+OBSERVATIONS = ("state", "pose", "image")
+
+C = TypeVar("C", WorldCfg, LandingWorldCfg)
+T = TypeVar("T", StartCfg, LandingStartCfg, RewardCfg)
+
+
+def world_settings(
+    default: C,
+    cfg: WorldCfg | LandingWorldCfg | None,
+    observation: str,
+    fidelity: str | None,
+    start: StartCfg | LandingStartCfg | Mapping[str, Any] | None,
+    time_limit_s: float | None,
+) -> C:
+    """The world that an environment's arguments ask for.
+
+    Args:
+        default: the world where no `cfg` is given.
+        cfg: the world, of the default's kind.
+        observation: one of `OBSERVATIONS`.
+        fidelity: in place of the `cfg`'s; without either, "pixels" for images and "beacons" for the rest.
+        start: in place of the `cfg`'s; a mapping changes only the fields that it names.
+        time_limit_s: in place of `cfg.limits.max_time_s`.
+
+    Raises:
+        ConfigError: an argument that cannot be used, by its name.
+    """
+    if cfg is None:
+        cfg = dataclasses.replace(default, fidelity="pixels" if observation == "image" else "beacons")
+    elif not isinstance(cfg, type(default)):
+        raise ConfigError("cfg", type(cfg).__name__, f"a {type(default).__name__}")
+    if fidelity is not None:
+        cfg = dataclasses.replace(cfg, fidelity=fidelity)
+    if start is not None:
+        cfg = dataclasses.replace(cfg, start=_changed("start", cfg.start, start))
+    if time_limit_s is not None:
+        limits = dataclasses.replace(cfg.limits, max_time_s=_seconds(time_limit_s))
+        cfg = dataclasses.replace(cfg, limits=limits)
+    return cfg
+
+
+def reward_settings(reward: RewardCfg | Mapping[str, Any] | None) -> RewardCfg:
+    """The reward that an environment's argument asks for: all of it, or changes to the default.
+
+    Raises:
+        ConfigError: a part that does not exist or a value that does not fit.
+    """
+    return RewardCfg() if reward is None else _changed("reward", RewardCfg(), reward)
+
+
+def check_options(
+    observation: str, fidelity: str | None, render_mode: str | None, camera: str, cameras: tuple[str, str]
+) -> None:
+    """Refuse options that do not exist or do not fit each other.
+
+    Raises:
+        ConfigError: the first such option.
+    """
+    if observation not in OBSERVATIONS:
+        raise ConfigError("observation", observation, f"one of {', '.join(OBSERVATIONS)}")
+    if render_mode not in (None, "rgb_array"):
+        raise ConfigError("render_mode", render_mode, "'rgb_array' or None")
+    if camera not in cameras:
+        raise ConfigError("render_camera", camera, " or ".join(repr(name) for name in cameras))
+    if observation == "image" and fidelity != "pixels":
+        raise ConfigError("fidelity", fidelity, "'pixels', image observations need rendered frames")
+
+
+def _changed(name: str, now: T, wanted: object) -> T:
+    """`wanted` itself if it is of the kind of `now`, or `now` with what a mapping names changed."""
+    if isinstance(wanted, type(now)):
+        return wanted
+    if isinstance(wanted, Mapping):
+        return merge(now, wanted, f"{name}.")
+    raise ConfigError(name, wanted, f"a {type(now).__name__} or a mapping of its fields")
+
+
+def _seconds(value: object) -> float:
+    """A time limit, checked."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf:
+        return float(value)
+    raise ConfigError("time_limit_s", value, "a number of seconds above 0")
