@@ -19,6 +19,8 @@ __all__ = ["LevelPose", "LevelSolver", "pose_offset", "rotated"]
 
 _MAX_ITERATIONS = 20
 _DECREMENT = 1e-8
+_MAX_SIGMA_M, _MAX_SIGMA_OF_RANGE = 0.1, 0.1 / 3.0
+"""Of the place, along its worst axis: three σ are 0.3 m, or 10 % of the range if that is more."""
 _NO_ROTATION = np.zeros(3)
 _IDENTITY = np.eye(6)
 
@@ -50,6 +52,17 @@ class LevelPose:
     def T_station_camera(self) -> Array:
         """(4, 4) the pose."""
         return self.estimate.T_station_camera
+
+    def is_sure(self, mark_m: Array) -> bool:
+        """Whether the place is known well enough to be a measurement: points that span few pixels for their noise fit
+        poses at any range, and the covariance says so.
+
+        Args:
+            mark_m: (3,) middle of the points in the station frame, from which the range counts.
+        """
+        range_m = float(np.linalg.norm(mark_m - self.T_station_camera[:3, 3]))
+        worst_m2 = float(np.linalg.eigvalsh(self.estimate.covariance[:3, :3])[2])
+        return worst_m2 <= max(_MAX_SIGMA_M, _MAX_SIGMA_OF_RANGE * range_m) ** 2
 
 
 class LevelSolver:

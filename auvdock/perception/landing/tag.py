@@ -58,7 +58,7 @@ class TagLevel:
         )
 
     def measure(self, tags: Sequence[TagDetection], attitude: Array, expected: Array | None = None) -> LevelPose | None:
-        """The pose of one frame, None without the tag or where its corners fit no pose.
+        """The pose of one frame, None without the tag or where its corners fit no pose, or any.
 
         Args:
             tags: what the detector saw; other numbers than the station's are ignored.
@@ -69,7 +69,7 @@ class TagLevel:
         for tag in tags:
             if tag.tag_id == self._tag.tag_id:
                 pose = self._pose(tag, attitude, expected)
-                if pose is not None and (best is None or pose.cost < best.cost):
+                if pose is not None and pose.is_sure(self._centre_m) and (best is None or pose.cost < best.cost):
                     best = pose
         return best
 
