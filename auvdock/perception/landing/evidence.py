@@ -32,7 +32,7 @@ _NU = 4.0
 def log_odds(
     pose: LevelPose, sigma_px: Array, lights_n: int, spots_n: int, image_px: tuple[int, int], volume_m3: float
 ) -> float:
-    """ln O of a naming.
+    """Log odds ln O of a naming.
 
     Args:
         pose: the pose that its lights give.
