@@ -11,8 +11,8 @@ t_ν is the density of the residuals over that of a perfect fit, Student's in pl
 known roughly: halos that merge and flicker move a light by several of its σ.
 
 Among strays alone the sum of O over all namings, the one that names nothing included, is 1 in the mean, for it is a
-ratio of densities. So odds above T appear in no more than one of T frames (Markov's inequality; strays that crowd together or
-follow the lights break it): that is what a threshold on O means.
+ratio of densities. So odds above T appear in no more than one of T frames (Markov's inequality; strays that crowd
+together or follow the lights break it): that is what a threshold on O means.
 """
 
 from __future__ import annotations
