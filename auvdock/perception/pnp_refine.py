@@ -106,9 +106,8 @@ def solve_from(
             seen += 1
             error_seen += size
     result[ERROR] = error_seen / seen if seen > 0 else error / len(lights)
-    for i in range(len(result)):
-        if not math.isfinite(result[i]):
-            result[COST] = np.nan
+    if not math.isfinite(result.sum()):
+        result[COST] = np.nan
     return result
 
 
@@ -118,20 +117,10 @@ def _is_wide(lights: Array) -> bool:
 
     The smaller eigenvalue of the scatter Σ (u - ū)(u - ū)ᵀ is above Σ σ², which noise alone gives.
     """
-    count = len(lights)
-    if count < 3:
+    if len(lights) < 3:
         return False
-    mean_u, mean_v, noise = 0.0, 0.0, 0.0
-    for i in range(count):
-        mean_u += lights[i, PIXEL] / count
-        mean_v += lights[i, PIXEL + 1] / count
-        noise += lights[i, SIGMA] ** 2
-    uu, uv, vv = 0.0, 0.0, 0.0
-    for i in range(count):
-        u, v = lights[i, PIXEL] - mean_u, lights[i, PIXEL + 1] - mean_v
-        uu += u * u
-        uv += u * v
-        vv += v * v
+    u, v = lights[:, PIXEL] - lights[:, PIXEL].mean(), lights[:, PIXEL + 1] - lights[:, PIXEL + 1].mean()
+    uu, uv, vv, noise = (u * u).sum(), (u * v).sum(), (v * v).sum(), (lights[:, SIGMA] ** 2).sum()
     # The product of both eigenvalues is the determinant; a difference would lose the small one beside the large one.
     larger = 0.5 * (uu + vv) + math.sqrt((0.5 * (uu - vv)) ** 2 + uv * uv)
     return larger > noise and uu * vv - uv * uv > noise * larger
