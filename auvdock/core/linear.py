@@ -13,11 +13,12 @@ __all__ = ["solve_positive"]
 
 
 def solve_positive(matrix: Array, right: Array) -> Array | None:
-    """Solution of a symmetric positive definite system by Cholesky, None where the matrix is no such thing.
+    """Solution of a symmetric positive definite system by Cholesky, None where there is none of finite numbers.
 
     Args:
         matrix: (n, n), of which the lower triangle is read.
         right: (n,) or (n, k).
     """
     _, solution, info = _posv(matrix, right, lower=1)
-    return None if info else solution
+    # LAPACK refuses a matrix that is not positive definite, but NaN on the right and overflow go through.
+    return None if info or not np.isfinite(solution).all() else solution

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
@@ -22,6 +21,7 @@ from auvdock.core.contracts import BLUE, Detections
 from auvdock.core.errors import ConfigError
 from auvdock.perception.association import Associated, pose_estimate
 from auvdock.perception.pnp import PnpCfg, PnpSolver
+from auvdock.perception.solvers import ransac
 from auvdock.perception.tracker import LightTracker
 
 __all__ = ["HungarianRansacAssociation", "HungarianRansacCfg"]
@@ -128,18 +128,10 @@ class HungarianRansacAssociation:
             return None
         xy = self._camera.normalise(pixels)
         points = np.ascontiguousarray(self._array_m[ids])
-        ok, _, _, inliers = cv2.solvePnPRansac(
-            points,
-            xy,
-            np.eye(3),
-            None,
-            iterationsCount=self._cfg.ransac_iterations,
-            reprojectionError=self._cfg.ransac_px / float(self._camera.matrix[0, 0]),
-            flags=cv2.SOLVEPNP_P3P,
-        )
-        if not ok or len(inliers) < 4:
+        error = self._cfg.ransac_px / float(self._camera.matrix[0, 0])
+        kept = ransac(points, xy, iterations=self._cfg.ransac_iterations, error=error)
+        if kept is None or len(kept) < 4:
             return None
-        kept = np.sort(np.asarray(inliers, dtype=np.int64).ravel())
         sigma = np.full(len(kept), self._sigma_px)
         solution = self._solver.plain(points[kept], pixels[kept], sigma, prior)
         if solution is None or not math.isfinite(solution.cost):

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
@@ -35,6 +34,7 @@ from auvdock.perception.pnp_refine import (
     solve_from,
     vector_of,
 )
+from auvdock.perception.solvers import project, solve_pnp
 
 __all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "light_table", "translation_from_rotation"]
 
@@ -185,21 +185,14 @@ class PnpSolver:
     def plain(self, points_m: Array, pixels: Array, sigma_px: Array, rotation_prior: Array) -> PnpSolution | None:
         """The standard PnP of the comparison: OpenCV's iterative solver, n ≥ 4 lights of a plane, attitude ignored."""
         xy = self._camera.normalise(pixels)
-        try:
-            ok, rotation, translation = cv2.solvePnP(points_m, xy, np.eye(3), None, flags=cv2.SOLVEPNP_ITERATIVE)
-        except cv2.error:
+        start = solve_pnp(points_m, xy, cv2.SOLVEPNP_ITERATIVE, 4)
+        if start is None:
             return None
-        if not ok:
-            return None
-        start = _pose(rotation, translation)
-        return self._refine(start, light_table(points_m, pixels, sigma_px), rotation_prior, "plain")
+        return self._refine(_pose(*start), light_table(points_m, pixels, sigma_px), rotation_prior, "plain")
 
     def project(self, solution: PnpSolution, points_m: Array) -> Array:
         """(k, 2) pixels of station points (k, 3) under a solution."""
-        pixels, _ = cv2.projectPoints(
-            points_m, solution.rotation_vector, solution.translation_m, self._matrix, self._distortion
-        )
-        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        return project(points_m, solution.rotation_vector, solution.translation_m, self._matrix, self._distortion)[0]
 
     def _judge(self, solution: PnpSolution) -> float:
         return solution.cost + self._attitude_weight * solution.attitude_error_rad**2
@@ -207,8 +200,8 @@ class PnpSolver:
     def _sqpnp(self, lights: Array, prior: Array) -> PnpSolution | None:
         points, pixels = _parts(lights)
         xy = self._camera.normalise(pixels)
-        ok, rotation, translation = cv2.solvePnP(points, xy, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
-        return self._refine(_pose(rotation, translation), lights, prior, "sqpnp") if ok else None
+        start = solve_pnp(points, xy, cv2.SOLVEPNP_SQPNP, 5)
+        return self._refine(_pose(*start), lights, prior, "sqpnp") if start is not None else None
 
     def _from_prior(self, lights: Array, prior: Array) -> PnpSolution | None:
         points, pixels = _parts(lights)
@@ -246,10 +239,10 @@ def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Ar
     mean_xy, mean_e = xy.mean(axis=0), e.mean(axis=0)
     centred = xy - mean_xy
     spread = float(np.vdot(centred, centred))
-    if spread < 1e-12:
+    if not spread >= 1e-12:
         return None
     depth = -float(np.vdot(centred, e)) / spread
-    if depth <= 0.0:
+    if not 0.0 < depth < math.inf:
         return None
     return np.array([*(mean_e + mean_xy * depth), depth])
 
@@ -259,6 +252,6 @@ def _parts(lights: Array) -> tuple[Array, Array]:
     return lights[:, :PIXEL].copy(), lights[:, PIXEL:SIGMA].copy()
 
 
-def _pose(rotation: NDArray[Any], translation: NDArray[Any]) -> Array:
+def _pose(rotation_vector: Array, translation_m: Array) -> Array:
     """(6,) of a rotation vector and a translation."""
-    return np.concatenate([rotation.ravel(), translation.ravel()], dtype=np.float64)
+    return np.concatenate([rotation_vector, translation_m])

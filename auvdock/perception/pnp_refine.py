@@ -62,9 +62,13 @@ def solve_from(
     Returns:
         (70 + n,) r; t; R (3, 3); T_station_camera (4, 4); covariance (6, 6); angle to the prior, rad; χ², nan where it
         did not end well and nothing else counts; mean of the seen lights' residuals, or of all where none is seen, px;
-        residuals (n,), px.
+        residuals (n,), px. It does not end well where the lights coincide or lie on one line, their noise considered,
+        or where a number is not finite.
     """
-    result = np.empty(RESIDUAL + len(lights))
+    result = np.zeros(RESIDUAL + len(lights))
+    if not _is_wide(lights):
+        result[COST] = np.nan
+        return result
     expected, weight = np.zeros(3), np.zeros((3, 3))
     if terms[_PRIOR_WEIGHT] > 0.0:
         for i in range(3):
@@ -102,7 +106,24 @@ def solve_from(
             seen += 1
             error_seen += size
     result[ERROR] = error_seen / seen if seen > 0 else error / len(lights)
+    if not math.isfinite(result.sum()):
+        result[COST] = np.nan
     return result
+
+
+@compiled
+def _is_wide(lights: Array) -> bool:
+    """Whether the images of lights (n, 7) spread by more than their noise along the direction of least spread.
+
+    The smaller eigenvalue of the scatter Σ (u - ū)(u - ū)ᵀ is above Σ σ², which noise alone gives.
+    """
+    if len(lights) < 3:
+        return False
+    u, v = lights[:, PIXEL] - lights[:, PIXEL].mean(), lights[:, PIXEL + 1] - lights[:, PIXEL + 1].mean()
+    uu, uv, vv, noise = (u * u).sum(), (u * v).sum(), (v * v).sum(), (lights[:, SIGMA] ** 2).sum()
+    # The product of both eigenvalues is the determinant; a difference would lose the small one beside the large one.
+    larger = 0.5 * (uu + vv) + math.sqrt((0.5 * (uu - vv)) ** 2 + uv * uv)
+    return larger > noise and uu * vv - uv * uv > noise * larger
 
 
 @compiled

@@ -22,6 +22,7 @@ import cv2
 import numpy as np
 
 from auvdock.core.arrays import Array, check_shape
+from auvdock.perception.solvers import spans
 
 __all__ = ["RpnpPose", "rpnp", "rpnp_poses"]
 
@@ -79,7 +80,7 @@ def rpnp_poses(points_m: Array, xy: Array) -> list[RpnpPose]:
     n = len(points_m)
     check_shape("points_m", points_m, (n, 3))
     check_shape("xy", xy, (n, 2))
-    if n < 3 or not (np.isfinite(points_m).all() and np.isfinite(xy).all()):
+    if not spans(points_m, xy, 3):
         return []
     axis = _rotation_axis(points_m)
     if axis is None:

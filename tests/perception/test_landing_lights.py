@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from auvdock.core.contracts import BLUE, Detections
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 from auvdock.perception.landing.bearing import group_bearing
 from auvdock.perception.landing.config import AttitudeCfg, LandingPerceptionCfg, LightLevelCfg
+from auvdock.perception.landing.evidence import log_odds
 from auvdock.perception.landing.level import LevelSolver, pose_offset
 from auvdock.perception.landing.lights import LightLevel
 from auvdock.perception.landing.pipeline import LandingPerception
@@ -87,6 +89,92 @@ def test_strays_alone_give_no_pose():
         spots = rng.uniform(0.0, (800.0, 600.0), (8, 2))
         detections = Detections.from_points(spots, np.full(8, 0.9), np.full(8, BLUE), 0.01)
         assert perception.update(detections, (), senses.proprioception(k / 20)).pose is None
+
+
+HOVER_M = 2.0
+
+
+@cache
+def chance_pictures() -> list[Array]:
+    """Forty pictures of twelve strays in which three happen to fit some pose from `HOVER_M` above: two in five do."""
+    rng = np.random.default_rng(11)
+    found: list[Array] = []
+    while len(found) < 40:
+        spots = rng.uniform(0.0, (800.0, 600.0), (12, 2))
+        named = LEVEL.find(spots_seen(spots), CAMERA.T_body_camera[:3, :3], HOVER_M)
+        if named is not None and named.count == 3:
+            found.append(spots)
+    return found
+
+
+def spots_seen(spots: Array) -> Detections:
+    return Detections.from_points(spots, np.full(len(spots), 0.9), np.full(len(spots), BLUE), 0.01)
+
+
+def test_odds_are_a_promise():
+    """Strays alone reach odds of T in no more than one of T frames (Markov); three lights among six mostly do."""
+    level = LightLevel(LightLevelCfg(min_odds=10.0), STATION, CAMERA, LevelSolver(AttitudeCfg(), CAMERA))
+    rng = np.random.default_rng(11)
+    pictures = map(spots_seen, chance_pictures())
+    strays = [level.find(spots, CAMERA.T_body_camera[:3, :3], HOVER_M) for spots in pictures]
+    # Of some 100 pictures 10 at most in the mean; 20 are beyond 0.2 % of Poisson's law.
+    assert sum(found is not None and found.convincing for found in strays) <= 20
+    T, attitude, pixels, height = sight(11)
+    right = 0
+    for _ in range(20):
+        found = LEVEL.find(seen(pixels[[0, 2, 3]], rng, 6), attitude, height)
+        if found is not None and found.convincing:
+            assert float(np.abs(pose_offset(T, found.pose.T_station_camera)[:3]).max()) < 0.2
+            right += 1
+    assert right >= 15
+
+
+def test_more_lights_are_better_evidence():
+    """Odds rise with each light that fits, and fall with noise and with the number of spots."""
+    T, attitude, pixels, _ = sight(12)
+    solver = LevelSolver(AttitudeCfg(), CAMERA)
+
+    def odds(n: int, spots_n: int, sigma_px: float, off_px: float) -> float:
+        shifted = pixels[:n] + off_px * np.array([1.0, -1.0]) * (-1.0) ** np.arange(n)[:, None]
+        sigma = np.full(n, sigma_px)
+        pose = solver.solve(LIGHTS[:n], shifted, sigma, attitude, T, (), "")
+        assert pose is not None
+        return log_odds(pose, sigma, 5, spots_n, (800, 600), 10.0)
+
+    assert odds(3, 12, 0.05, 0.0) < odds(4, 12, 0.05, 0.0) < odds(5, 12, 0.05, 0.0)
+    assert odds(4, 12, 0.05, 0.0) > odds(4, 40, 0.05, 0.0)
+    assert odds(4, 12, 0.05, 0.0) > odds(4, 12, 0.5, 0.0)
+    assert odds(4, 12, 0.05, 0.0) > odds(4, 12, 0.05, 1.0)
+
+
+def test_strays_that_stay_give_no_pose():
+    """A chance picture that stays, as snow and foreign lights do, agrees from frame to frame; it is no station."""
+    rng = np.random.default_rng(2)
+    senses = Senses(Descent(np.array([0.0, 0.0, HOVER_M]), 0.0, HOVER_M), rng)
+    perception = LandingPerception(LandingPerceptionCfg(), CAMERA, STATION)
+    for picture in chance_pictures()[:12]:
+        perception.reset()
+        for k in range(5):
+            percept = perception.update(spots_seen(picture), (), senses.proprioception(k / 20))
+            assert percept.pose is None
+
+
+def test_strays_do_not_move_a_pose():
+    """Lights gone, strays in their stead: refused poses that contradict one another restart nothing."""
+    rng = np.random.default_rng(3)
+    flight = Descent(np.array([0.1, -0.1, HOVER_M]), 0.0, HOVER_M)
+    senses = Senses(flight, rng)
+    cfg = LandingPerceptionCfg(lights=LightLevelCfg(min_odds=1e-300))
+    perception = LandingPerception(cfg, CAMERA, STATION)
+    strays = chance_pictures()[:25]
+    for k in range(20 + len(strays)):
+        t = k / 20
+        lights = senses.lights(t) if k < 20 else spots_seen(strays[k - 20])
+        percept = perception.update(lights, (), senses.proprioception(t))
+        if percept.pose is not None:
+            gap = percept.pose.T_station_camera[:3, 3] - flight.camera(t)[:3, 3]
+            assert float(np.linalg.norm(gap)) < 0.1
+    assert percept.status == "holding"
 
 
 def test_a_mirrored_or_scaled_pattern_is_refused():

@@ -61,6 +61,15 @@ def test_stated_deviations_are_honest() -> None:
     assert (spread < 1.25).all()
 
 
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_the_same_sweep_again_and_again_still_gives_numbers(count: int) -> None:
+    """No parallax, and sights that contradict one another by half a turn: finite numbers."""
+    sweep = Sweep(0.0, 1.0, 0.0, 2.0, np.zeros(2))
+    for sweeps in ([sweep] * count, [sweep, sweep._replace(bearing_rad=2.0 - math.pi)] * count):
+        estimate = fuse(sweeps, ForwardBeaconCfg())
+        assert np.isfinite(np.concatenate([np.atleast_1d(part) for part in estimate])).all()
+
+
 def test_without_parallax_the_range_is_the_priors() -> None:
     """At rest, and with one sight alone, the range is unknown and says so; no sight is an error."""
     still = fuse(_sweeps(np.zeros((6, 2)), np.array([40.0, 0.0]), 0.0, np.zeros((6, 2))), CFG)

@@ -35,6 +35,7 @@ def test_peak_between_frames_without_noise(frames: int, widening: float) -> None
         fit = fit_pass(
             angle, np.where(seen, light, limit), 0.02 * np.maximum(light, limit), seen, BEAM, (math.log(0.25), 1.0)
         )
+        assert fit is not None
         error = abs(fit.offset_rad - phase * STEP)
         assert error < math.radians(1.0 if frames == 2 else 0.15)
 
@@ -44,10 +45,27 @@ def test_a_single_sample_gives_its_own_time_with_a_wide_sigma() -> None:
     angle = 0.3 + STEP * np.arange(-2.0, 3.0)
     seen = np.array([False, False, True, False, False])
     fit = fit_pass(angle, np.ones(5), np.full(5, 0.05), seen, BEAM)
+    assert fit is not None
     assert abs(fit.offset_rad - 0.3) < math.radians(3.0)
     assert fit.sigma_rad > math.radians(1.0)
     with pytest.raises(ValueError, match="sample"):
         fit_pass(np.zeros(1), np.zeros(1), np.ones(1), np.array([False]), BEAM)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e110])
+@pytest.mark.parametrize("where", ["angle", "flux"])
+def test_what_is_no_number_is_no_pass(value: float, where: str) -> None:
+    angle, flux = STEP * np.arange(-3.0, 4.0), np.exp(-(np.arange(-3.0, 4.0) ** 2))
+    (angle if where == "angle" else flux)[2] = value
+    fit = fit_pass(angle, flux, np.full(7, 0.02), np.ones(7, dtype=np.bool_), BEAM)
+    assert fit is None or (math.isfinite(value) and np.isfinite(fit).all())
+
+
+def test_samples_at_one_angle_or_without_light_still_give_numbers() -> None:
+    for angle, flux in ((np.zeros(5), np.ones(5)), (STEP * np.arange(5.0), np.zeros(5))):
+        fit = fit_pass(angle, flux, np.full(5, 0.02), np.ones(5, dtype=np.bool_), BEAM)
+        assert fit is not None
+        assert np.isfinite(fit).all()
 
 
 def _monte_carlo(signal: PassSignal, n: int, seed: int) -> tuple[float, float]:
@@ -62,6 +80,7 @@ def _monte_carlo(signal: PassSignal, n: int, seed: int) -> tuple[float, float]:
         flux = mean + noise * rng.standard_normal(len(angle))
         sigma = np.sqrt(np.maximum(flux, 0.0) + signal.background_e + signal.read_variance_e2)
         fit = fit_pass(angle, flux, sigma, np.ones(len(angle), dtype=np.bool_), BEAM, (math.log(0.25), 2.0))
+        assert fit is not None
         error.append(fit.offset_rad - phase * STEP)
         told.append(error[-1] / fit.sigma_rad)
     return float(np.sqrt(np.mean(np.square(error)))), float(np.sqrt(np.mean(np.square(told))))

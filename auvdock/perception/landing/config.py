@@ -53,12 +53,15 @@ class LightLevelCfg:
     found. Ours: tide and chart leave some decimetres; 0 switches the check off."""
     confirm_n: int = 3
     """Consecutive frames that must agree, the vehicle's motion taken out, before a first pose is believed."""
+    min_odds: float = 1000.0
+    """A pose that lights alone begin must be so many times more likely than strays in their places (`evidence`): strays
+    alone reach that in no more than one of so many frames."""
     gate_px: float = 25.0
     """Farthest that a light may be from where the filter expects it."""
 
     def __post_init__(self) -> None:
         """Refuse settings without meaning."""
-        for name in ("centre_sigma_px", "max_reprojection_px", "gate_px"):
+        for name in ("centre_sigma_px", "max_reprojection_px", "gate_px", "min_odds"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(name, getattr(self, name), "a value above 0")
         for name in ("centre_sigma_widths", "max_height_error_m"):
@@ -108,7 +111,8 @@ class FilterCfg:
     """A level whose squared Mahalanobis distance from the prediction is beyond this is left out: 1e-4 of χ² with six
     degrees of freedom."""
     reset_after_n: int = 10
-    """Consecutive frames after which a level that is left out, and that no other level contradicts, is believed."""
+    """Consecutive frames, agreeing with one another, after which a level that is left out, and that no other level
+    contradicts, is believed."""
 
     def __post_init__(self) -> None:
         """Refuse what no filter can use."""

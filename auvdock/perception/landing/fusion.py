@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.core.linear import solve_positive
 from auvdock.core.transforms import make_transform
 from auvdock.perception.landing.level import LevelPose, pose_offset, rotated
 
@@ -21,7 +22,9 @@ def weighted_mean(lights: LevelPose, tag: LevelPose) -> tuple[Array, Array]:
     """(pose (4, 4), covariance (6, 6)) of both levels; headings are averaged on the circle, as all rotation is."""
     c_l, c_a, x = _covariances(lights, tag)
     offset = pose_offset(lights.T_station_camera, tag.T_station_camera)
-    k2 = np.linalg.solve((c_l + c_a - x - x.T).T, (c_l - x).T).T
+    weights = solve_positive(c_l + c_a - x - x.T, (c_l - x).T)
+    # Where the difference has no variance in some direction both are the same there: either will do.
+    k2 = np.zeros((6, 6)) if weights is None else weights.T
     k1 = np.eye(6) - k2
     step = k2 @ offset
     T = lights.T_station_camera
@@ -34,7 +37,8 @@ def agree(lights: LevelPose, tag: LevelPose, gate: float) -> bool:
     """Whether the levels' poses lie within the gate (squared Mahalanobis distance) of each other."""
     c_l, c_a, x = _covariances(lights, tag)
     offset = pose_offset(lights.T_station_camera, tag.T_station_camera)
-    return float(offset @ np.linalg.solve(c_l + c_a - x - x.T, offset)) <= gate
+    weighed = solve_positive(c_l + c_a - x - x.T, offset)
+    return weighed is not None and float(offset @ weighed) <= gate
 
 
 def _covariances(lights: LevelPose, tag: LevelPose) -> tuple[Array, Array, Array]:

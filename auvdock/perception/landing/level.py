@@ -14,11 +14,14 @@ from auvdock.core.contracts import PoseEstimate
 from auvdock.core.linear import solve_positive
 from auvdock.core.transforms import make_transform
 from auvdock.perception.landing.config import AttitudeCfg
+from auvdock.perception.solvers import project
 
 __all__ = ["LevelPose", "LevelSolver", "pose_offset", "rotated"]
 
 _MAX_ITERATIONS = 20
 _DECREMENT = 1e-8
+_MAX_SIGMA_M, _MAX_SIGMA_OF_RANGE = 0.1, 0.1 / 3.0
+"""Of the place, along its worst axis: three σ are 0.3 m, or 10 % of the range if that is more."""
 _NO_ROTATION = np.zeros(3)
 _IDENTITY = np.eye(6)
 
@@ -51,6 +54,18 @@ class LevelPose:
         """(4, 4) the pose."""
         return self.estimate.T_station_camera
 
+    def is_sure(self, mark_m: Array) -> bool:
+        """Whether the place is known well enough to be a measurement.
+
+        Points that span few pixels for their noise fit poses at any range; the covariance says so.
+
+        Args:
+            mark_m: (3,) middle of the points in the station frame, from which the range counts.
+        """
+        range_m = float(np.linalg.norm(mark_m - self.T_station_camera[:3, 3]))
+        worst_m2 = float(np.linalg.eigvalsh(self.estimate.covariance[:3, :3])[2])
+        return worst_m2 <= max(_MAX_SIGMA_M, _MAX_SIGMA_OF_RANGE * range_m) ** 2
+
 
 class LevelSolver:
     """Levenberg–Marquardt over (position, rotation) for one camera.
@@ -79,7 +94,7 @@ class LevelSolver:
         ids: tuple[int, ...],
         solver: str,
     ) -> LevelPose | None:
-        """The pose of n ≥ 3 points, None where there is none in front of the camera.
+        """The pose of n ≥ 3 points, None for fewer and where there is none in front of the camera.
 
         Args:
             points_m: (n, 3) points in the station frame.
@@ -90,6 +105,8 @@ class LevelSolver:
             ids: for the estimate.
             solver: name of what gave the start, for the estimate.
         """
+        if len(points_m) < 3 or len(points_m) != len(pixels):
+            return None
         position, rotation = start[:3, 3].copy(), start[:3, :3].copy()
         damping, best = 0.0, math.inf
         kept: tuple[Array, Array, Array, Array, Array, Array] | None = None
@@ -145,8 +162,8 @@ class LevelSolver:
         q = (points - position) @ rotation
         if not bool((q[:, 2] > 1e-3).all()):
             return None
-        image, by_q = cv2.projectPoints(q, _NO_ROTATION, _NO_ROTATION, self._matrix, self._distortion)
-        difference = image.reshape(-1, 2) - pixels
+        image, by_q = project(q, _NO_ROTATION, _NO_ROTATION, self._matrix, self._distortion)
+        difference = image - pixels
         n = len(q)
         # du/dq of each point: with the identity as pose that is the derivative by the translation.
         du = by_q[:, 3:6].reshape(n, 2, 3)

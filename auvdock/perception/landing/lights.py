@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -13,6 +15,7 @@ from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.linear import solve_positive
 from auvdock.core.transforms import invert, make_transform
 from auvdock.perception.landing.config import LightLevelCfg
+from auvdock.perception.landing.evidence import log_odds
 from auvdock.perception.landing.identity import hypotheses, match
 from auvdock.perception.landing.level import LevelPose, LevelSolver, pose_offset
 from auvdock.perception.rpnp import rpnp_poses
@@ -31,18 +34,19 @@ _Start = tuple[Array, str]
 """A pose to refine and where it comes from."""
 
 
+@dataclass(frozen=True, eq=False)
 class NamedLights:
     """A level pose and which detection is which light.
 
     Attributes:
         pose: the pose.
         detection: (m,) index of each light's detection, -1 for none.
+        convincing: whether the spots speak for the station by themselves: strays hardly explain them.
     """
 
-    def __init__(self, pose: LevelPose, detection: IntArray) -> None:
-        """Keep both."""
-        self.pose = pose
-        self.detection = detection
+    pose: LevelPose
+    detection: IntArray
+    convincing: bool
 
     @property
     def count(self) -> int:
@@ -65,7 +69,6 @@ class LightLevel:
         self._camera = camera
         self._solver = solver
         self._points_m = np.ascontiguousarray(station.layout.array_positions_m)
-        self._station_depth_m = station.depth_m
         self._focal_px = float(camera.matrix[0, 0])
 
     def find(self, detections: Detections, attitude: Array, height_m: float | None) -> NamedLights | None:
@@ -168,11 +171,14 @@ class LightLevel:
                 starts.insert(0, (own, "rpnp"))
         for T, name in starts:
             pose = self._solver.solve(points, pixels, sigma, attitude, T, ids, name)
-            if pose is None:
+            if pose is None or not pose.is_sure(points.mean(axis=0)):
                 continue
             limit = self._cfg.max_reprojection_px * float(np.maximum(sigma, 1.0).mean())
             if pose.estimate.reprojection_error_px <= limit:
-                return NamedLights(pose, named)
+                spots_n = int((detections.class_id == BLUE).sum())
+                if start[1] != "tracked":
+                    spots_n = min(spots_n, self._cfg.max_lights_n)
+                return NamedLights(pose, named, self._convinces(pose, sigma, spots_n))
         return None
 
     def _rpnp(self, points: Array, pixels: Array, attitude: Array) -> Array | None:
@@ -184,6 +190,16 @@ class LightLevel:
             if angle < least:
                 best, least = pose, angle
         return None if best is None else invert(make_transform(best.rotation, best.translation_m))
+
+    def _convinces(self, pose: LevelPose, sigma_px: Array, spots_n: int) -> bool:
+        """Whether a naming out of so many spots is hardly one of strays."""
+        error_m = self._cfg.max_height_error_m
+        span_m = 2.0 * error_m if error_m > 0.0 else _WIDE_HEIGHT_M[1] - _WIDE_HEIGHT_M[0]
+        size = self._camera.width_px, self._camera.height_px
+        # The camera may be wherever it has the station in its image.
+        across_m2 = size[0] * size[1] * (float(pose.T_station_camera[2, 3]) / self._focal_px) ** 2
+        odds = log_odds(pose, sigma_px, len(self._points_m), spots_n, size, across_m2 * span_m)
+        return odds >= math.log(self._cfg.min_odds)
 
     def _sigma_px(self, detections: Detections, index: IntArray) -> Array:
         width = detections.xyxy[index, 2:] - detections.xyxy[index, :2]

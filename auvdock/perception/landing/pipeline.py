@@ -19,21 +19,18 @@ from auvdock.core.contracts import (
     TagDetection,
 )
 from auvdock.core.landing_station import LandingStationCfg
+from auvdock.perception.landing.agreement import Agreement
 from auvdock.perception.landing.bearing import group_bearing
 from auvdock.perception.landing.config import LandingPerceptionCfg
 from auvdock.perception.landing.filter import LandingFilter
 from auvdock.perception.landing.fusion import agree, weighted_mean
-from auvdock.perception.landing.level import LevelPose, LevelSolver, pose_offset
+from auvdock.perception.landing.level import LevelPose, LevelSolver
 from auvdock.perception.landing.lights import LightLevel, NamedLights
 from auvdock.perception.landing.tag import TagLevel
 from auvdock.perception.tracker import LightTracker
 from auvdock.perception.views import TrackViews
 
 __all__ = ["LandingPercept", "LandingPerception"]
-
-_AGREE_M = 0.15
-"""How far a light pose may lie from the last one, the vehicle's motion taken out, to confirm it."""
-_AGREE_SIGMAS = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +74,10 @@ class LandingPerception:
         self._tag = TagLevel(cfg.tag, station.tag, camera, solver)
         self._tracks = LightTracker(cfg.tracker, camera.rate_hz, camera.width_px, camera.height_px)
         self._filter = LandingFilter(cfg.filter, cfg.attitude, camera, math.radians(cfg.station_yaw_deg))
-        self._trial = LandingFilter(cfg.filter, cfg.attitude, camera, math.radians(cfg.station_yaw_deg))
+        self._new_lights, self._new_tag = (
+            Agreement(LandingFilter(cfg.filter, cfg.attitude, camera, math.radians(cfg.station_yaw_deg)))
+            for _ in range(2)
+        )
         self.reset()
 
     def reset(self) -> None:
@@ -110,9 +110,10 @@ class LandingPerception:
         expected = self._filter.pose(proprioception) if self._filter.running else None
         place = expected[0] if expected is not None else None
         tag = self._tag.measure(tags, attitude, place) if cfg.levels != "lights" else None
-        named = self._name(detections, attitude, proprioception, expected) if cfg.levels != "tag" else None
+        height_m = self._height_m(attitude, proprioception)
+        named = self._name(detections, attitude, height_m, expected) if cfg.levels != "tag" else None
         lights = named.pose if named is not None else None
-        used_lights, used_tag = self._fuse(lights, tag, proprioception)
+        used_lights, used_tag = self._fuse(named, tag, proprioception)
         self._missed_lights = 0 if used_lights else self._missed_lights + 1
         self._missed_tag = 0 if used_tag else self._missed_tag + 1
         measured = used_lights or used_tag
@@ -137,74 +138,58 @@ class LandingPerception:
         )
 
     def _forget(self) -> None:
-        """Forget the light pose that waits for confirmation, and what was left out."""
-        self._trial.reset()
-        self._confirmed = 0
-        self._refused_lights = self._refused_tag = 0
+        """Forget the poses that wait to be believed."""
+        self._new_lights.reset()
+        self._new_tag.reset()
+
+    def _height_m(self, attitude: Array, proprioception: Proprioception) -> float:
+        """Height of the camera above the station's origin by the pressure gauge and the station's charted depth."""
+        arm = self._camera.T_body_camera[:3, 3]
+        above = float((attitude @ self._camera.T_body_camera[:3, :3].T @ arm)[2])
+        return self._station.depth_m - proprioception.depth_m + above
 
     def _name(
-        self,
-        detections: Detections,
-        attitude: Array,
-        proprioception: Proprioception,
-        expected: tuple[Array, Array] | None,
+        self, detections: Detections, attitude: Array, height_m: float, expected: tuple[Array, Array] | None
     ) -> NamedLights | None:
         if expected is not None:
             named = self._lights.follow(detections, attitude, *expected)
             if named is not None:
                 return named
-        height = self._station.depth_m - proprioception.depth_m
-        arm = self._camera.T_body_camera[:3, 3]
-        height += float((attitude @ self._camera.T_body_camera[:3, :3].T @ arm)[2])
-        return self._lights.find(detections, attitude, height)
+        return self._lights.find(detections, attitude, height_m)
 
     def _fuse(
-        self, lights: LevelPose | None, tag: LevelPose | None, proprioception: Proprioception
+        self, named: NamedLights | None, tag: LevelPose | None, proprioception: Proprioception
     ) -> tuple[bool, bool]:
         """Put the levels into the filter; which of them were used."""
         if not self._filter.running:
-            return self._begin(lights, tag, proprioception)
-        gate = self._cfg.filter.gate
+            return self._begin(named, tag, proprioception)
+        gate, patience = self._cfg.filter.gate, self._cfg.filter.reset_after_n
+        lights = named.pose if named is not None else None
         good_tag = tag is not None and self._filter.distance2(tag, proprioception) <= gate
         good_lights = lights is not None and self._filter.distance2(lights, proprioception) <= gate
-        self._refused_tag = self._refused_tag + 1 if tag is not None and not good_tag else 0
-        self._refused_lights = self._refused_lights + 1 if lights is not None and not good_lights else 0
-        patience = self._cfg.filter.reset_after_n
+        new_tag = self._new_tag.add(None if good_tag else tag, proprioception)
+        new_lights = self._new_lights.add(None if good_lights else _convincing(named), proprioception)
         # The tag's code is proof of what it is, so it is believed against the lights; these only against no one.
-        if tag is not None and self._refused_tag >= patience:
+        if tag is not None and new_tag >= patience:
             return self._restart(tag, False, proprioception)
-        if lights is not None and self._refused_lights >= patience and self._missed_tag >= patience:
+        if lights is not None and new_lights >= patience and self._missed_tag >= patience:
             return self._restart(lights, True, proprioception)
         self._apply(lights if good_lights else None, tag if good_tag else None, proprioception)
         return good_lights, good_tag
 
     def _begin(
-        self, lights: LevelPose | None, tag: LevelPose | None, proprioception: Proprioception
+        self, named: NamedLights | None, tag: LevelPose | None, proprioception: Proprioception
     ) -> tuple[bool, bool]:
         """The first pose: at once from a tag, from lights alone once some consecutive frames agree."""
+        lights = named.pose if named is not None else None
         if tag is not None:
             both = lights is not None and agree(lights, tag, self._cfg.filter.gate)
             self._start(lights if both else None, tag, proprioception)
             return both, True
-        if lights is None:
-            self._trial.reset()
-            self._confirmed = 0
-            return False, False
-        self._confirmed = self._confirmed + 1 if self._confirms(lights, proprioception) else 1
-        self._trial.reset()
-        self._trial.start([lights], proprioception)
-        if self._confirmed < self._cfg.lights.confirm_n:
+        if self._new_lights.add(_convincing(named), proprioception) < self._cfg.lights.confirm_n:
             return False, False
         self._start(lights, None, proprioception)
         return True, False
-
-    def _confirms(self, lights: LevelPose, proprioception: Proprioception) -> bool:
-        expected = self._trial.expected(proprioception)
-        if expected is None:
-            return False
-        offset = pose_offset(expected[0], lights.T_station_camera)
-        spread = np.sqrt(np.diag(expected[1])[:3] + np.diag(lights.estimate.covariance)[:3])
-        return bool((np.abs(offset[:3]) <= _AGREE_M + _AGREE_SIGMAS * spread).all())
 
     def _start(self, lights: LevelPose | None, tag: LevelPose | None, proprioception: Proprioception) -> None:
         self._filter.reset()
@@ -277,3 +262,8 @@ class LandingPerception:
                 if detection >= 0:
                     tracks.beacon_id[tracks.detection == detection] = light
         return tracks.views()
+
+
+def _convincing(named: NamedLights | None) -> LevelPose | None:
+    """The pose of lights that strays hardly explain."""
+    return named.pose if named is not None and named.convincing else None

@@ -15,6 +15,7 @@ from auvdock.core.landing_station import TagCfg
 from auvdock.core.transforms import invert, make_transform
 from auvdock.perception.landing.config import TagLevelCfg
 from auvdock.perception.landing.level import LevelPose, LevelSolver
+from auvdock.perception.solvers import solve_square
 
 __all__ = ["TagLevel", "tag_corners_m"]
 
@@ -58,7 +59,7 @@ class TagLevel:
         )
 
     def measure(self, tags: Sequence[TagDetection], attitude: Array, expected: Array | None = None) -> LevelPose | None:
-        """The pose of one frame, None without the tag or where its corners fit no pose.
+        """The pose of one frame, None without the tag or where its corners fit no pose, or any.
 
         Args:
             tags: what the detector saw; other numbers than the station's are ignored.
@@ -69,7 +70,7 @@ class TagLevel:
         for tag in tags:
             if tag.tag_id == self._tag.tag_id:
                 pose = self._pose(tag, attitude, expected)
-                if pose is not None and (best is None or pose.cost < best.cost):
+                if pose is not None and pose.is_sure(self._centre_m) and (best is None or pose.cost < best.cost):
                     best = pose
         return best
 
@@ -113,17 +114,9 @@ class TagLevel:
     def _starts(self, xy: Array, attitude: Array) -> list[tuple[Array, str]]:
         """Poses (4, 4) to refine, and where they come from."""
         starts: list[tuple[Array, str]] = []
-        try:
-            count, rotations, translations, _ = cv2.solvePnPGeneric(
-                self._square, xy, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE_SQUARE
-            )
-        except cv2.error:
-            count, rotations, translations = 0, (), ()
-        for index in range(count):
-            rotation = np.asarray(cv2.Rodrigues(rotations[index])[0], dtype=np.float64)
-            translation = np.asarray(translations[index], dtype=np.float64).ravel()
-            if np.isfinite(translation).all() and translation[2] > 0.0:
-                starts.append((self._T_station_square @ invert(make_transform(rotation, translation)), "ippe"))
-                # The same distance, seen as upright as the vehicle says it is.
-                starts.append((make_transform(attitude, self._centre_m - attitude @ translation), "prior"))
+        for vector, translation in solve_square(self._square, xy):
+            rotation = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
+            starts.append((self._T_station_square @ invert(make_transform(rotation, translation)), "ippe"))
+            # The same distance, seen as upright as the vehicle says it is.
+            starts.append((make_transform(attitude, self._centre_m - attitude @ translation), "prior"))
         return starts

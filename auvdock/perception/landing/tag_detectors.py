@@ -13,6 +13,7 @@ from auvdock.core.arrays import Array, Image
 from auvdock.core.contracts import Frame, RegionOfInterest, TagDetection
 from auvdock.core.errors import ConfigError
 from auvdock.perception.landing.tag_edges import corners_from_lines, lines_through, refined_corners
+from auvdock.perception.solvers import homography
 
 __all__ = ["TAG_DETECTORS", "AprilTagDetector", "ContourTagDetector", "TagDetector", "make_tag_detector"]
 
@@ -152,8 +153,10 @@ class ContourTagDetector:
     def _read(self, grey: Image, quad: Array) -> tuple[int, int] | None:
         """(number, quarter turns) of the code within a quadrilateral, None if it is none of the family's."""
         side = 6 * _CELLS
-        target = np.array([[0, 0], [side, 0], [side, side], [0, side]], dtype=np.float32) - 0.5
-        warp = cv2.getPerspectiveTransform(quad.astype(np.float32), target)
+        target = np.array([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]]) - 0.5
+        warp = homography(quad, target)
+        if warp is None:
+            return None
         flat = cv2.warpPerspective(grey, warp, (side, side))
         level, _ = cv2.threshold(flat, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
         cells = np.asarray(flat, dtype=np.float64).reshape(_CELLS, 6, _CELLS, 6)[:, 1:5, :, 1:5].mean(axis=(1, 3))

@@ -18,6 +18,8 @@ _MIN_LOG_EXCESS = math.log(MIN_WIDENING - 1.0)
 _OFFSETS = 61
 _STEPS = 12
 _PRIOR_DOF = 4.0
+_MAX_RATIO = 1e100
+"""Flux over its standard deviation; no light is so steady."""
 
 
 class PassFit(NamedTuple):
@@ -45,13 +47,14 @@ def fit_pass(
     seen: BoolArray,
     beam_sigma_rad: float,
     prior_log_excess: tuple[float, float] = (math.log(0.25), 1.0),
-) -> PassFit:
+) -> PassFit | None:
     """Least squares of a g(θ_i - δ; x) on the samples over amplitude a, peak δ and widening x.
 
     Minimises Σ_seen ((F_i - a g_i) / σ_i)² + Σ_unseen (max(0, a g_i - F_i) / σ_i)² + ((ln(x - 1) - μ) / τ)²: a frame in
     which the light was not found tells only that it was dimmer than what a detector finds. A grid gives the start, then
     damped Gauss–Newton steps. The standard deviation is that of the linearised problem, times the root of the reduced
-    χ² with four prior degrees of freedom of 1 (so few samples tell little of their own scatter).
+    χ² with four prior degrees of freedom of 1 (so few samples tell little of their own scatter). None where numbers are
+    not finite, or too large to square.
 
     Args:
         angle_rad: (n,) beam angles of the samples; any origin.
@@ -66,6 +69,8 @@ def fit_pass(
     """
     if not seen.any():
         raise ValueError("a pass needs a sample in which the light was found")
+    if not (np.isfinite(angle_rad).all() and np.abs(flux / sigma).max() < _MAX_RATIO):
+        return None
     mean, spread = prior_log_excess
     if int(seen.sum()) == 1:
         # Anywhere between its neighbours is as likely: the middle, with the deviation of a uniform distribution.

@@ -145,6 +145,8 @@ class PassFinder:
         origin = float(times[peak])
         angle = self._omega * (times[rows] - origin)
         fit = fit_pass(angle, data, sigma, seen, self._beam_sigma_rad, prior)
+        if fit is None:
+            return None
         sigma_rad = fit.sigma_rad
         # A frame that glare took, that was dropped or in which the light was out of view may have been the brightest.
         sigma_rad = math.hypot(sigma_rad, gap_rad / math.sqrt(12.0))
