@@ -11,10 +11,9 @@ from typing import Annotated
 
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.progress import track
 
-from auvdock.cli.parsing import parse
+from auvdock.cli.console import messages, track
+from auvdock.cli.parsing import at_least, parse
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
@@ -51,21 +50,22 @@ class FitDetector:
 def run(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(FitDetector, argv, prog)
+    at_least(1, frames=args.frames)
+    at_least(0, seed=args.seed)
     detector = make_detector(args.detector)
     rng = np.random.default_rng(args.seed)
     observations: list[Observation] = []
-    console = Console(stderr=True)
     for water, attenuation in CONDITIONS:
         world = DockingWorld(WorldCfg(water=water, attenuation_per_m=attenuation))
         poses = sample_poses(args.frames, world.cfg.station.depth_m, rng)
-        shown = track(poses, f"{water} c={attenuation or 'preset'}", console=console, transient=True)
+        shown = track(poses, f"{water} c={attenuation or 'preset'}")
         observations += observe(world.imager, detector, shown, rng)
         world.close()
     names = ", ".join(f"{water} c={c:g}" if c else water for water, c in CONDITIONS)
     source = f"auvdock fit-detector {args.detector} --frames {args.frames} --seed {args.seed}; waters {names}"
     model = fit_detection_model(args.detector, source, observations)
     write_model(model, args.out, "out")
-    console.print(f"{len(observations)} frames; wrote {args.out}", highlight=False)
+    messages().print(f"{len(observations)} frames; wrote {args.out}", highlight=False, soft_wrap=True)
     return 0
 
 
