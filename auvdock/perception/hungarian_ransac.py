@@ -2,13 +2,13 @@
 
 The program that the paper's authors published differs from its text: its RANSAC hands three points to a solver that
 refuses them, so it never rejects anything, and on failure it repeats the last pose as if it were new. Here RANSAC works
-(P3P on four points) and a frame without a pose has none; `hold_last` repeats the last pose instead, marked as not
-measured.
+(P3P on four points), lights that are off by its threshold lose their names, and where those that keep theirs are not
+all or do not reproject as their noise allows, all are named anew in the same frame. A frame without a pose has none;
+`hold_last` repeats the last pose instead, marked as not measured.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, Detections
 from auvdock.core.errors import ConfigError
 from auvdock.perception.association import Associated, pose_estimate
+from auvdock.perception.credibility import Credibility, CredibilityCfg
 from auvdock.perception.pnp import PnpCfg, PnpSolver
 from auvdock.perception.solvers import ransac
 from auvdock.perception.tracker import LightTracker
@@ -57,14 +58,22 @@ class HungarianRansacAssociation:
     """
 
     def __init__(
-        self, cfg: HungarianRansacCfg, pnp: PnpCfg, pixel_sigma_px: float, camera: Camera, layout: BeaconLayout
+        self,
+        cfg: HungarianRansacCfg,
+        pnp: PnpCfg,
+        credibility: CredibilityCfg,
+        pixel_sigma_px: float,
+        camera: Camera,
+        layout: BeaconLayout,
     ) -> None:
         """Keep the array and the camera."""
         self._cfg = cfg
         self._sigma_px = pixel_sigma_px
         self._camera = camera
         self._array_m = np.ascontiguousarray(layout.array_positions_m)
+        self._max_reprojection_px = pnp.max_reprojection_px
         self._solver = PnpSolver(replace(pnp, attitude_prior_sigma_deg=0.0), camera)
+        self._credibility = Credibility(credibility, camera, self._array_m, attitude_sigma_rad=0.0)
         self.reset()
 
     def reset(self) -> None:
@@ -84,10 +93,11 @@ class HungarianRansacAssociation:
         self._solver.heading_sigma_rad = heading_sigma_rad
         tracks.beacon_id[:] = -1
         blue = np.flatnonzero(detections.class_id == BLUE)
-        ids, chosen = self._carry(detections, blue)
-        if len(ids) < 4:
-            ids, chosen = self._by_angle(detections, blue, rotation_prior)
-        result = self._solve(ids, detections.centre_px[chosen], rotation_prior)
+        result, ids, chosen = self._named(detections, *self._carry(detections, blue), rotation_prior)
+        if len(ids) < len(self._array_m) <= len(blue) or result is None:
+            named = self._named(detections, *self._by_angle(detections, blue, rotation_prior), rotation_prior)
+            if result is None or (named[0] is not None and len(named[1]) > len(ids)):
+                result, ids, chosen = named
         if result is None:
             self._ids = np.zeros(0, dtype=np.int64)
             return self._held if self._cfg.hold_last and self._held is not None else Associated()
@@ -97,6 +107,19 @@ class HungarianRansacAssociation:
         if result.pose is not None:
             self._held = Associated(replace(result.pose, measured=False), 0, None)
         return result
+
+    def _named(
+        self, detections: Detections, ids: IntArray, chosen: IntArray, prior: Array
+    ) -> tuple[Associated | None, IntArray, IntArray]:
+        """The pose of named lights, and those of them that it bears out; None if the names do not hold.
+
+        A light that is off from where the pose has it loses its name: carried on, a wrong one would never be put right.
+        """
+        solved = self._solve(ids, detections.centre_px[chosen], prior)
+        if solved is None:
+            return None, ids, chosen
+        result, kept = solved
+        return result, ids[kept], chosen[kept]
 
     def _carry(self, detections: Detections, blue: IntArray) -> tuple[IntArray, IntArray]:
         """Hungarian assignment of the last frame's beacons to this frame's lights."""
@@ -123,7 +146,7 @@ class HungarianRansacAssociation:
         error = [float(np.sum(1.0 - np.cos(seen - np.roll(known, shift)))) for shift in range(k)]
         return np.roll(beacons, int(np.argmin(error))), chosen
 
-    def _solve(self, ids: IntArray, pixels: Array, prior: Array) -> Associated | None:
+    def _solve(self, ids: IntArray, pixels: Array, prior: Array) -> tuple[Associated, IntArray] | None:
         if len(ids) < 4:
             return None
         xy = self._camera.normalise(pixels)
@@ -134,7 +157,11 @@ class HungarianRansacAssociation:
             return None
         sigma = np.full(len(kept), self._sigma_px)
         solution = self._solver.plain(points[kept], pixels[kept], sigma, prior)
-        if solution is None or not math.isfinite(solution.cost):
+        if solution is None or solution.error_px > self._max_reprojection_px:
+            return None
+        if not self._credibility.holds(solution):
             return None
         pose = pose_estimate(solution, tuple(ids[kept].tolist()), True)
-        return Associated(pose, len(ids), solution)
+        off_px = np.linalg.norm(self._solver.project(solution, points) - pixels, axis=1)
+        near = np.flatnonzero(off_px <= self._cfg.ransac_px)
+        return Associated(pose, len(near), solution), near

@@ -20,17 +20,26 @@ _MIN_SEEN = 4
 
 @compiled
 def labelled_lights(
-    numbers: Array, labels: IntArray, centre_px: Array, array_m: Array, sigma_px: float
+    numbers: Array,
+    labels: IntArray,
+    centre_px: Array,
+    xyxy: Array,
+    size_px: tuple[int, int],
+    array_m: Array,
+    sigma_px: float,
 ) -> tuple[Array, IntArray, int]:
     """The array beacons among the tracks, in the order of their ids.
 
     Those that were seen in this frame if they are four or more; else predicted ones as well, at their track's place and
-    with their track's σ on top of a detection's.
+    with their track's σ on top of a detection's. Of a light that the picture's edge cuts, the centre is that of the part
+    that is left: off by up to half of the box.
 
     Args:
         numbers: (n, 7 or more) of the tracks, as `LightTracker.numbers`.
         labels: (n, 6) of the tracks, as `LightTracker.labels`.
         centre_px: (m, 2) this frame's detections.
+        xyxy: (m, 4) their boxes, px.
+        size_px: width and height of the picture.
         array_m: (k, 3) array beacons in the station frame.
         sigma_px: σ of a detection.
 
@@ -58,6 +67,9 @@ def labelled_lights(
             if j >= 0:
                 lights[row, 3], lights[row, 4] = centre_px[j, 0], centre_px[j, 1]
                 lights[row, 5], lights[row, 6] = sigma_px, 1.0
+                left, top, right, bottom = xyxy[j, 0], xyxy[j, 1], xyxy[j, 2], xyxy[j, 3]
+                if left <= 0.0 or top <= 0.0 or right >= size_px[0] - 1 or bottom >= size_px[1] - 1:
+                    lights[row, 5] += 0.5 * max(right - left, bottom - top)
             else:
                 lights[row, 3], lights[row, 4] = numbers[i, 0], numbers[i, 1]
                 lights[row, 5], lights[row, 6] = sigma_px + math.sqrt(numbers[i, _COVARIANCE]), 0.0

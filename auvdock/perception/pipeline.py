@@ -12,6 +12,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.perception.association import Association
 from auvdock.perception.authentication import AuthenticationCfg
+from auvdock.perception.credibility import CredibilityCfg
 from auvdock.perception.hungarian_ransac import HungarianRansacAssociation, HungarianRansacCfg
 from auvdock.perception.line_of_sight import LineOfSight, LineOfSightCfg
 from auvdock.perception.pnp import PnpCfg
@@ -45,6 +46,8 @@ class PerceptionCfg:
     """Spatiotemporal authentication."""
     pnp: PnpCfg = PnpCfg()
     """Pose from beacons."""
+    credibility: CredibilityCfg = CredibilityCfg()
+    """When a pose is believed."""
     hungarian_ransac: HungarianRansacCfg = HungarianRansacCfg()
     """The comparison's settings."""
     line_of_sight: LineOfSightCfg = LineOfSightCfg()
@@ -97,9 +100,13 @@ class BeaconPerception:
         sigma = cfg.tracker.pixel_sigma_px
         self._association: Association
         if cfg.association == "spatiotemporal":
-            self._association = SpatiotemporalAssociation(cfg.authentication, cfg.pnp, sigma, camera, layout)
+            self._association = SpatiotemporalAssociation(
+                cfg.authentication, cfg.pnp, cfg.credibility, sigma, camera, layout
+            )
         else:
-            self._association = HungarianRansacAssociation(cfg.hungarian_ransac, cfg.pnp, sigma, camera, layout)
+            self._association = HungarianRansacAssociation(
+                cfg.hungarian_ransac, cfg.pnp, cfg.credibility, sigma, camera, layout
+            )
         self._line_of_sight = LineOfSight(cfg.line_of_sight, camera, layout)
 
     def reset(self) -> None:

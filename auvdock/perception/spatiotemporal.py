@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
@@ -10,6 +12,7 @@ from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, Detections
 from auvdock.perception.association import Associated, pose_estimate
 from auvdock.perception.authentication import AuthenticationCfg, Authenticator
+from auvdock.perception.credibility import Credibility, CredibilityCfg
 from auvdock.perception.labelled import labelled_lights
 from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
 from auvdock.perception.tracker import LightTracker
@@ -40,6 +43,7 @@ class SpatiotemporalAssociation:
         self,
         cfg: AuthenticationCfg,
         pnp: PnpCfg,
+        credibility: CredibilityCfg,
         pixel_sigma_px: float,
         camera: Camera,
         layout: BeaconLayout,
@@ -50,6 +54,7 @@ class SpatiotemporalAssociation:
         self._sigma_px = pixel_sigma_px
         self._camera = camera
         self._array_m = np.ascontiguousarray(layout.array_positions_m)
+        self._size_px = (camera.width_px, camera.height_px)
         self._focal_px = float(camera.matrix[0, 0])
         radius = np.linalg.norm(self._array_m - self._array_m.mean(axis=0), axis=1)
         self._radius_m = float(radius.mean())
@@ -58,6 +63,10 @@ class SpatiotemporalAssociation:
         self._blue_m = np.ascontiguousarray(np.vstack([self._array_m, layout.positions_m[others]]))
         self._authenticator = Authenticator(cfg, self._array_m, self._focal_px)
         self._solver = PnpSolver(pnp, camera)
+        self._credibility = Credibility(
+            credibility, camera, self._blue_m, math.radians(pnp.attitude_prior_sigma_deg)
+        )
+        self._min_log_odds = credibility.min_log_odds
         self.reset()
 
     def reset(self) -> None:
@@ -91,7 +100,13 @@ class SpatiotemporalAssociation:
     def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Array) -> Associated | None:
         """Pose from the tracks that carry an identity; clears all identities and returns None if it does not hold."""
         lights, owners, seen = labelled_lights(
-            tracks.numbers, tracks.labels, detections.centre_px, self._array_m, self._sigma_px
+            tracks.numbers,
+            tracks.labels,
+            detections.centre_px,
+            detections.xyxy,
+            self._size_px,
+            self._array_m,
+            self._sigma_px,
         )
         count = len(lights)
         if count == 0:
@@ -116,7 +131,7 @@ class SpatiotemporalAssociation:
         solution = self._solver.solve_lights(lights, prior, self._last)
         if solution is None or (seen and solution.error_px > self._pnp.max_reprojection_px):
             return None
-        return solution
+        return solution if self._credibility.holds(solution) else None
 
     def _without_worst(
         self, tracks: LightTracker, lights: Array, owners: IntArray, prior: Array
@@ -141,9 +156,11 @@ class SpatiotemporalAssociation:
         if len(chosen) < self._cfg.min_beacons:
             return False
         pixels = tracks.state[chosen, :2]
+        blue = np.flatnonzero(tracks.class_id == BLUE)
+        others = tracks.state[np.setdiff1d(blue, chosen), :2]
         self._last = None
         for identity in self._authenticator.propose(self._camera.normalise(pixels), prior):
-            settled = self._settle(pixels, identity, prior)
+            settled = self._settle(pixels, identity, prior, others)
             if settled is not None:
                 identity, self._last = settled
                 self._age = 0
@@ -153,8 +170,13 @@ class SpatiotemporalAssociation:
                 return True
         return False
 
-    def _settle(self, pixels: Array, identity: IntArray, prior: Array) -> tuple[IntArray, PnpSolution] | None:
-        """Solve, look again where all beacons must be, and solve again; None if the identities do not hold."""
+    def _settle(
+        self, pixels: Array, identity: IntArray, prior: Array, others_px: Array
+    ) -> tuple[IntArray, PnpSolution] | None:
+        """Solve, look again where all beacons must be, and solve again; None if the identities do not hold.
+
+        `others_px` (m, 2) are blue lights that are no candidates, but may be beacons all the same.
+        """
         for _ in range(2):
             beacons = np.flatnonzero(identity >= 0)
             if len(beacons) < self._cfg.min_beacons:
@@ -169,9 +191,20 @@ class SpatiotemporalAssociation:
                 return None
             again = self._match(solution, pixels)
             if np.array_equal(again, identity):
-                return (identity, solution) if solution.error_px <= self._pnp.max_reprojection_px else None
+                return (identity, solution) if self._likely(solution, identity, pixels, others_px) else None
             identity = again
         return None
+
+    def _likely(self, solution: PnpSolution, identity: IntArray, pixels: Array, others_px: Array) -> bool:
+        """Whether new identities hold: a good fit, and far likelier than spurious lights in those places."""
+        if solution.error_px > self._pnp.max_reprojection_px or not self._credibility.holds(solution):
+            return False
+        unused = np.setdiff1d(np.arange(len(self._blue_m)), np.flatnonzero(identity >= 0))
+        others_px = np.vstack([np.delete(pixels, identity[identity >= 0], axis=0), others_px])
+        odds = self._credibility.log_odds(
+            solution, unused, others_px, self._sigma_px, self._solver.heading_sigma_rad
+        )
+        return odds >= self._min_log_odds
 
     def _match(self, solution: PnpSolution, pixels: Array) -> IntArray:
         """(k,) the candidate at each array beacon's reprojection, -1 where there is none."""

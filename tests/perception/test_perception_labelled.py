@@ -23,12 +23,14 @@ from auvdock.perception.prior import AttitudePrior
 def test_lights_are_those_that_numpy_finds(seed: int, tracks: int, seen_share: float):
     rng = np.random.default_rng(seed)
     array_m, centre_px = rng.normal(size=(8, 3)), rng.uniform(0.0, 600.0, (tracks, 2))
+    half = rng.uniform(0.5, 10.0, (tracks, 2))
+    xyxy = np.hstack([centre_px - half, centre_px + half])
     numbers = rng.uniform(1.0, 600.0, (tracks, 13))
     labels = rng.integers(0, 5, (tracks, 6))
     labels[:, 2] = np.where(np.arange(tracks) < 8, np.arange(tracks), -1)
     labels[:, 2] = rng.permutation(np.where(rng.uniform(size=tracks) < 0.7, labels[:, 2], -1))
     labels[:, 5] = np.where(rng.uniform(size=tracks) < seen_share, rng.permutation(tracks), -1)
-    lights, owners, seen = labelled_lights(numbers, labels, centre_px, array_m, 0.5)
+    lights, owners, seen = labelled_lights(numbers, labels, centre_px, xyxy, (640, 360), array_m, 0.5)
 
     rows = np.flatnonzero(labels[:, 2] >= 0)
     rows = rows[np.argsort(labels[rows, 2])]
@@ -41,7 +43,11 @@ def test_lights_are_those_that_numpy_finds(seed: int, tracks: int, seen_share: f
     assert lights[:, :3].tolist() == array_m[labels[rows, 2]].tolist()
     pixels = np.where(found[:, None], centre_px[labels[rows, 5]], numbers[rows, :2])
     assert lights[:, 3:5].tolist() == pixels.tolist()
-    assert lights[:, 5] == pytest.approx(np.where(found, 0.5, 0.5 + np.sqrt(numbers[rows, 4])))
+    boxes = xyxy[labels[rows, 5]]
+    cut = (boxes[:, :2] <= 0.0).any(axis=1) | (boxes[:, 2:] >= np.array([639.0, 359.0])).any(axis=1)
+    half_box = 0.5 * (boxes[:, 2:] - boxes[:, :2]).max(axis=1) if len(rows) else np.zeros(0)
+    sigma = np.where(found, 0.5 + cut * half_box, 0.5 + np.sqrt(numbers[rows, 4]))
+    assert lights[:, 5] == pytest.approx(sigma)
     assert lights[:, 6].tolist() == found.tolist()
 
 

@@ -1,0 +1,152 @@
+"""Whether a solved pose can be believed: its fit, its own uncertainty, its range, and what chance would have found.
+
+A reprojection error alone accepts poses that no light supports: four spots within a pixel of one another reproject well
+at any range, and among a dozen spurious lights some four lie like four of six beacons. A pose is doubted by
+
+1. its fit: χ² of reprojection and attitude prior at the solution, against its distribution for n lights;
+2. its range: the standard deviation along the line of sight, σ_r, must be a small share of the range, and no lamp is seen
+   farther away than its light reaches;
+3. chance: identities that are handed out anew must be far likelier than spurious lights in those places. That is the
+   score of multiple-hypothesis tracking (Reid 1979; Blackman & Popoli 1999, section 6.2), with the pose, which nobody
+   knows beforehand, integrated out by Laplace's approximation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtri
+
+from auvdock.core.arrays import Array, IntArray
+from auvdock.core.camera import Camera
+from auvdock.core.errors import ConfigError
+from auvdock.perception.pnp import PnpSolution
+
+__all__ = ["Credibility", "CredibilityCfg"]
+
+
+@dataclass(frozen=True)
+class CredibilityCfg:
+    """When a solved pose is believed."""
+
+    fit_probability: float = 0.01
+    """A right pose has a worse χ² with this probability; one that fits worse is not believed."""
+    max_range_sigma: float = 0.1
+    """Greatest σ_r over the range ..."""
+    max_range_sigma_m: float = 0.3
+    """... and σ_r that is always good enough."""
+    max_range_m: float = 60.0
+    """Lamps are seen no farther than this in any water (paper B saw a 30 W beacon at 50 m)."""
+    detection_probability: float = 0.9
+    """Share of the beacons in view that a detector finds, for the odds of a new identification."""
+    min_log_odds: float = 10.0
+    """Least natural logarithm of (probability of these lights if they are the beacons, over that if they are not)."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no check can use."""
+        for name in ("fit_probability", "detection_probability"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ConfigError(name, getattr(self, name), "a probability above 0 and below 1")
+        for name in ("max_range_sigma", "max_range_sigma_m", "max_range_m"):
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(name, getattr(self, name), "a value above 0")
+
+
+class Credibility:
+    """Judges the poses of one array in one camera."""
+
+    def __init__(self, cfg: CredibilityCfg, camera: Camera, blue_m: Array, attitude_sigma_rad: float) -> None:
+        """Keep what every judgement needs.
+
+        Args:
+            cfg: thresholds.
+            camera: the camera.
+            blue_m: (k, 3) blue lamps in the station frame.
+            attitude_sigma_rad: standard deviation per axis of the attitude prior in the solutions, 0 for none.
+        """
+        self._cfg = cfg
+        self._camera = camera
+        self._blue_m = blue_m
+        self._attitude_sigma_rad = attitude_sigma_rad
+        known = 3 if attitude_sigma_rad > 0.0 else 0
+        freedom = 2.0 * np.arange(len(blue_m) + 1) + known - 6.0
+        self._worst_fit = [float(chdtri(f, cfg.fit_probability)) if f > 0 else math.inf for f in freedom]
+        corner = camera.normalise(np.array([[-0.5, -0.5], [camera.width_px - 0.5, camera.height_px - 0.5]]))
+        width, height = (corner[1] - corner[0]).tolist()
+        # The camera may be anywhere from where the array lies within its field of view and its light's reach.
+        self._log_volume = math.log(width * height * cfg.max_range_m**3 / 3.0)
+        self._area_px = float(camera.width_px * camera.height_px)
+
+    def holds(self, solution: PnpSolution) -> bool:
+        """Whether fit, σ_r and range are those of a right pose."""
+        cfg = self._cfg
+        position = solution.T_station_camera()[:3, 3]
+        range_m = math.sqrt(float(position @ position))
+        if solution.cost > self._worst_fit[len(solution.residual_px)] or range_m > cfg.max_range_m:
+            return False
+        variance = float(position @ solution.covariance()[:3, :3] @ position) / range_m**2
+        return variance <= max(cfg.max_range_sigma_m, cfg.max_range_sigma * range_m) ** 2
+
+    def log_odds(
+        self,
+        solution: PnpSolution,
+        unused: IntArray,
+        others_px: Array,
+        sigma_px: float,
+        heading_sigma_rad: float | None = None,
+    ) -> float:
+        """Natural logarithm of the odds that the lights behind a pose are beacons rather than spurious lights.
+
+        For n lights that gave the pose, ln [(P_D A / N)^n ∫ Π N(z_i; pose) p(pose) d(pose)], where N lights lie on the
+        area A; the integral is (2π σ²)^{-n} e^{-χ²/2} (2π)³ √|Σ| p(pose), with p uniform over the positions from which
+        lamps can be seen. Each further blue lamp that should be in view adds ln(P_D A N(z; pose) / N) for the light
+        nearest to its place, or ln(1 - P_D) where there is none.
+
+        Args:
+            solution: pose of n lights, all seen.
+            unused: rows of `blue_m` that are not among them.
+            others_px: (m, 2) other blue lights, seen now or predicted.
+            sigma_px: σ of a light's place per axis.
+            heading_sigma_rad: σ of the prior about the station's upright axis where it is worse than the rest.
+        """
+        n = len(solution.residual_px)
+        found = self._cfg.detection_probability
+        each = math.log(found * self._area_px / (2.0 * math.pi * (n + len(others_px))))
+        log_pose = 3.0 * math.log(2.0 * math.pi) + 0.5 * float(np.linalg.slogdet(solution.covariance())[1])
+        log_pose += self._log_attitude(heading_sigma_rad) - self._log_volume
+        odds = n * (each - 2.0 * math.log(sigma_px)) - 0.5 * solution.cost + log_pose
+        for gap, spread in self._expected(solution, unused, others_px, sigma_px):
+            missed = math.log(1.0 - found)
+            if len(gap):
+                distance = np.einsum("ij,ij->i", gap, np.linalg.solve(spread, gap.T).T)
+                near = each - 0.5 * math.log(np.linalg.det(spread)) - 0.5 * float(distance.min())
+                missed = max(missed, near)
+            odds += missed
+        return odds
+
+    def _log_attitude(self, heading_sigma_rad: float | None) -> float:
+        """Logarithm of the prior's density at its middle, or of that of any attitude."""
+        if self._attitude_sigma_rad == 0.0:
+            return -math.log(8.0 * math.pi**2)
+        heading = max(self._attitude_sigma_rad, heading_sigma_rad or 0.0)
+        sigmas = (self._attitude_sigma_rad, self._attitude_sigma_rad, heading)
+        return -sum(math.log(sigma * math.sqrt(2.0 * math.pi)) for sigma in sigmas)
+
+    def _expected(
+        self, solution: PnpSolution, rows: IntArray, others_px: Array, sigma_px: float
+    ) -> Iterator[tuple[Array, Array]]:
+        """For each lamp in view: (m, 2) from its place to every other light, and the place's covariance (2, 2), px."""
+        points = self._blue_m[rows] @ solution.rotation.T + solution.translation_m
+        points = points[self._camera.in_view(points)]
+        places = self._camera.project(points)
+        focal_x, focal_y = float(self._camera.matrix[0, 0]), float(self._camera.matrix[1, 1])
+        covariance = solution.covariance()
+        for (x, y, z), place in zip(points.tolist(), places, strict=True):
+            by_point = np.array([[focal_x / z, 0.0, -focal_x * x / z**2], [0.0, focal_y / z, -focal_y * y / z**2]])
+            # y = R (X - c), and the camera turns by φ: dy = -R dc + y × φ.
+            cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+            by_pose = by_point @ np.hstack([-solution.rotation, cross])
+            yield others_px - place, by_pose @ covariance @ by_pose.T + sigma_px**2 * np.eye(2)
