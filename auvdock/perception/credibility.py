@@ -4,8 +4,8 @@ A reprojection error alone accepts poses that no light supports: four spots with
 at any range, and among a dozen spurious lights some four lie like four of six beacons. A pose is doubted by
 
 1. its fit: χ² of reprojection and attitude prior at the solution, against its distribution for n lights;
-2. its range: the standard deviation along the line of sight, σ_r, must be a small share of the range, and no lamp is seen
-   farther away than its light reaches;
+2. its range: the standard deviation along the line of sight, σ_r, must be a small share of the range, and no lamp is
+   seen farther away than its light reaches;
 3. chance: identities that are handed out anew must be far likelier than spurious lights in those places. That is the
    score of multiple-hypothesis tracking (Reid 1979; Blackman & Popoli 1999, section 6.2), with the pose, which nobody
    knows beforehand, integrated out by Laplace's approximation.

@@ -31,8 +31,8 @@ def labelled_lights(
     """The array beacons among the tracks, in the order of their ids.
 
     Those that were seen in this frame if they are four or more; else predicted ones as well, at their track's place and
-    with their track's σ on top of a detection's. Of a light that the picture's edge cuts, the centre is that of the part
-    that is left: off by up to half of the box.
+    with their track's σ on top of a detection's. Of a light that the picture's edge cuts, the centre is that of the
+    part that is left: off by up to half of the box.
 
     Args:
         numbers: (n, 7 or more) of the tracks, as `LightTracker.numbers`.

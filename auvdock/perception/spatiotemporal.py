@@ -63,9 +63,7 @@ class SpatiotemporalAssociation:
         self._blue_m = np.ascontiguousarray(np.vstack([self._array_m, layout.positions_m[others]]))
         self._authenticator = Authenticator(cfg, self._array_m, self._focal_px)
         self._solver = PnpSolver(pnp, camera)
-        self._credibility = Credibility(
-            credibility, camera, self._blue_m, math.radians(pnp.attitude_prior_sigma_deg)
-        )
+        self._credibility = Credibility(credibility, camera, self._blue_m, math.radians(pnp.attitude_prior_sigma_deg))
         self._min_log_odds = credibility.min_log_odds
         self.reset()
 
@@ -201,9 +199,7 @@ class SpatiotemporalAssociation:
             return False
         unused = np.setdiff1d(np.arange(len(self._blue_m)), np.flatnonzero(identity >= 0))
         others_px = np.vstack([np.delete(pixels, identity[identity >= 0], axis=0), others_px])
-        odds = self._credibility.log_odds(
-            solution, unused, others_px, self._sigma_px, self._solver.heading_sigma_rad
-        )
+        odds = self._credibility.log_odds(solution, unused, others_px, self._sigma_px, self._solver.heading_sigma_rad)
         return odds >= self._min_log_odds
 
     def _match(self, solution: PnpSolution, pixels: Array) -> IntArray:

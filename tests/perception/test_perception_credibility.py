@@ -1,4 +1,4 @@
-"""Poses that must be doubted: four spots within a pixel, spurious lights in a pattern, fits that noise does not explain."""
+"""Poses that must be doubted: four spots within a pixel, spurious lights in a pattern, fits worse than noise."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_a_pose_beyond_the_reach_of_light_is_not_believed(credibility: Credibili
 
 
 def test_a_range_is_believed_as_far_as_the_span_of_the_lights_tells_it(credibility: Credibility):
-    """σ_r / r = σ_px / √Σ s², s the lights' distances from their middle: with σ of 4 px a tenth is reached near 12 m."""
+    """σ_r / r = σ_px / √Σ s², s the lights' distances from their middle: σ of 4 px gives a tenth near 12 m."""
     for distance_m in (5.0, 8.0, 14.0, 20.0):
         truth = looking_at_the_ring(distance_m)
         pixels = pixels_of(truth, RING)
