@@ -12,10 +12,9 @@ from typing import Any
 
 import cv2
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
+from auvdock.cli.console import output, track
 from auvdock.cli.parsing import parse
 from auvdock.core.errors import GraphicsError
 from auvdock.envs.docking import DockingEnv
@@ -51,7 +50,7 @@ def run(argv: Sequence[str], prog: str) -> int:
         ("landing pixels", lambda: _episodes("pixels", args.episodes, "landing")),
     ]
     report: dict[str, Any] = {"cores": 1, "machine_cores": os.cpu_count()}
-    shown = steps if args.json else track(steps, "measuring", console=Console(stderr=True), transient=True)
+    shown = steps if args.json else track(steps, "measuring")
     for name, measure in shown:
         try:
             report[name.replace(" ", "_")] = measure()
@@ -179,7 +178,7 @@ def _print(report: dict[str, Any]) -> None:
     for part, figures in report.items():
         if isinstance(figures, dict):
             _rows(table, part, figures)
-    Console().print(table)
+    output().print(table)
 
 
 def _rows(table: Table, prefix: str, figures: dict[str, Any]) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
+from auvdock.cli.console import command_line, description, live, messages, output
 from auvdock.core.station import ConicalStationCfg
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.trace import EpisodeSetup, Tick
@@ -26,7 +27,7 @@ class ProgressDisplay:
 
     def __init__(self) -> None:
         """Prepare; nothing is shown before the episode starts."""
-        self._console = Console(stderr=True)
+        self._console = messages()
         self._inside_m = 0.0
         self._progress: Progress | None = None
         self._start_range_m: float | None = None
@@ -40,10 +41,10 @@ class ProgressDisplay:
             # Starts all around may lie behind the station, where no way along the axis is left.
             self._around = station.rotating is not None
             self._inside_m = station.funnel.length_m + station.latch.depth_m
-        self._console.print(f"auvdock: {setup.title}, water {setup.water}, detector {setup.detector}")
+        line = f"auvdock: {setup.title}, water {setup.water}, detector {setup.detector}"
+        self._console.print(line, soft_wrap=True)
         if self._console.is_terminal:
-            columns = (TextColumn("{task.description}"), BarColumn(40), TimeElapsedColumn())
-            self._progress = Progress(*columns, console=self._console, transient=True)
+            self._progress = live(self._console, description(), BarColumn(40), TimeElapsedColumn())
             self._progress.add_task("starting", total=1.0)
             self._progress.start()
 
@@ -73,11 +74,11 @@ class ProgressDisplay:
 
 def print_result(result: EpisodeResult, record: Path | None, title: str = "conical docking") -> None:
     """The result as a table on standard output."""
-    console = Console()
+    console = output()
     table = Table(title=f"{title}, seed {result.seed}", title_justify="left")
     table.add_column("metric")
     table.add_column("value", justify="right")
-    verdict = "[green]docked[/green]" if result.success else f"[red]failed: {result.failure_reason}[/red]"
+    verdict = Text("docked", "green") if result.success else Text(f"failed: {result.failure_reason}", "red")
     table.add_row("outcome", verdict)
     rows: list[_Line] = [
         ("time", result.time_s, "{:.1f} s"),
@@ -94,7 +95,8 @@ def print_result(result: EpisodeResult, record: Path | None, title: str = "conic
         table.add_row(name, "-" if value is None else form.format(value))
     console.print(table)
     if record is not None:
-        console.print(f"recording: {record}   (auvdock view {record})", highlight=False)
+        view = command_line("auvdock", "view", record)
+        console.print(f"recording: {record}   ({view})", highlight=False, soft_wrap=True)
 
 
 def _rotating_rows(result: EpisodeResult) -> list[tuple[str, float | int | None, str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from abc import ABC, abstractmethod
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from auvdock.cli.console import tell
 from auvdock.core.errors import ConfigError, GraphicsError
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.optics.gl import probe_gl
@@ -96,7 +96,7 @@ def _working_fidelity() -> str:
         probe_gl()
     except GraphicsError as error:
         if GL_REFUSAL is None:  # of which every command tells
-            print(f"auvdock: {error}", file=sys.stderr)
+            tell(str(error))
         return "beacons"
     return "pixels"
 

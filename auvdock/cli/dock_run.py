@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -12,9 +11,13 @@ import cv2
 
 from auvdock.campaign.replay import StoredEpisode, stored_episode
 from auvdock.campaign.row import differences, row_of
+from auvdock.cli import exit_codes
+from auvdock.cli.console import tell
 from auvdock.cli.display import ProgressDisplay, print_result
 from auvdock.cli.dock_flags import DockFlags
 from auvdock.cli.parsing import base_config, parse, station_file, with_station
+from auvdock.cli.recorded import run_recorded
+from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
@@ -86,21 +89,20 @@ def _fly(
     if flags.seed < 0:
         raise ConfigError("seed", flags.seed, "a whole number of 0 or more")
     cv2.setNumThreads(1)  # frames this small gain nothing from OpenCV's threads and stall on a busy machine
-    observers: list[EpisodeObserver] = []
-    if flags.record is not None:
-        from auvdock.recording.rerun_recorder import RerunRecorder
-
-        observers.append(RerunRecorder(flags.record))
-    if not flags.json:
-        observers.append(ProgressDisplay())
-    result = runner.run(flags.seed, observers)
+    shown: list[EpisodeObserver] = [] if flags.json else [ProgressDisplay()]
+    saving = Saving()
+    if flags.record is None:
+        result = runner.run(flags.seed, shown)
+    else:
+        result = run_recorded(runner, flags.seed, flags.record, saving, shown)
     if check is not None:
         check(result)
     if flags.json:
-        print(json.dumps(result.to_json(), allow_nan=False))
+        failed = {} if flags.record is None else {"recording_error": saving.errors[0] if saving.errors else None}
+        print(json.dumps(result.to_json() | failed, allow_nan=False))
     else:
-        print_result(result, flags.record, title)
-    return 0 if result.success else 1
+        print_result(result, None if saving.errors else flags.record, title)
+    return saving.finish(exit_codes.DONE if result.success else exit_codes.NOT_MET)
 
 
 def _tell_whether_equal(stored: StoredEpisode, result: EpisodeResult) -> None:
@@ -108,4 +110,4 @@ def _tell_whether_equal(stored: StoredEpisode, result: EpisodeResult) -> None:
         return
     changed = differences(stored.row, row_of(stored.spec, result))
     found = f"differs from the campaign's in {', '.join(changed)}" if changed else "equals the campaign's, bit for bit"
-    print(f"auvdock: episode {stored.spec.episode} {found}", file=sys.stderr)
+    tell(f"episode {stored.spec.episode} {found}")

@@ -13,9 +13,10 @@ from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from auvdock.cli.console import output
 from auvdock.cli.parsing import parse
 from auvdock.core.compiled import cache_folders
 from auvdock.core.errors import AuvdockError
@@ -66,9 +67,9 @@ def run(argv: Sequence[str], prog: str) -> int:
         for column in ("part", "state", "detail", "remedy"):
             table.add_column(column)
         for check in checks:
-            state = "[green]ok[/green]" if check.ok else ("[red]missing[/red]" if check.required else "not ok")
+            state = Text("ok", "green") if check.ok else Text("missing", "red") if check.required else "not ok"
             table.add_row(check.name, state, check.detail, check.remedy)
-        Console().print(table)
+        output().print(table)
     return 1 if any(check.required and not check.ok for check in checks) else 0
 
 

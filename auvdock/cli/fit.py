@@ -11,9 +11,8 @@ from typing import Annotated
 
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.progress import track
 
+from auvdock.cli.console import messages, track
 from auvdock.cli.parsing import parse
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
@@ -54,18 +53,17 @@ def run(argv: Sequence[str], prog: str) -> int:
     detector = make_detector(args.detector)
     rng = np.random.default_rng(args.seed)
     observations: list[Observation] = []
-    console = Console(stderr=True)
     for water, attenuation in CONDITIONS:
         world = DockingWorld(WorldCfg(water=water, attenuation_per_m=attenuation))
         poses = sample_poses(args.frames, world.cfg.station.depth_m, rng)
-        shown = track(poses, f"{water} c={attenuation or 'preset'}", console=console, transient=True)
+        shown = track(poses, f"{water} c={attenuation or 'preset'}")
         observations += observe(world.imager, detector, shown, rng)
         world.close()
     names = ", ".join(f"{water} c={c:g}" if c else water for water, c in CONDITIONS)
     source = f"auvdock fit-detector {args.detector} --frames {args.frames} --seed {args.seed}; waters {names}"
     model = fit_detection_model(args.detector, source, observations)
     write_model(model, args.out, "out")
-    console.print(f"{len(observations)} frames; wrote {args.out}", highlight=False)
+    messages().print(f"{len(observations)} frames; wrote {args.out}", highlight=False, soft_wrap=True)
     return 0
 
 

@@ -10,9 +10,8 @@ from typing import Annotated
 
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.progress import track
 
+from auvdock.cli.console import messages, track
 from auvdock.cli.fit import CONDITIONS, write_model
 from auvdock.cli.parsing import parse
 from auvdock.core.arrays import Array
@@ -59,7 +58,6 @@ def run(argv: Sequence[str], prog: str) -> int:
     rng = np.random.default_rng(args.seed)
     lights: list[Observation] = []
     tags: list[TagObservation] = []
-    console = Console(stderr=True)
     every = tuple(beacon.name for beacon in LandingWorldCfg().station.beacons)
     for water, attenuation in CONDITIONS:
         for lamp, dark in ((None, ()), (LampCfg(), ()), (LampCfg(), every)):
@@ -69,7 +67,7 @@ def run(argv: Sequence[str], prog: str) -> int:
             world = LandingWorld(cfg)
             poses = sample_landing_poses(args.frames, world.camera, cfg.station.depth_m, rng)
             name = f"{water} c={attenuation or 'preset'}, lamp {'on' if lamp else 'off'}{', dark' if dark else ''}"
-            shown = track(poses, name, console=console, transient=True)
+            shown = track(poses, name)
             seen, read = observe_landing(world.imager, cfg.station, detector, tag_detector, shown, rng)
             # A dark station's lights cannot be found, and what is found there is no light.
             lights += () if dark else seen
@@ -81,7 +79,7 @@ def run(argv: Sequence[str], prog: str) -> int:
     )
     write_model(fit_detection_model(args.detector, source, lights), args.out_lights, "out_lights")
     write_model(fit_tag_model(args.tag_detector, source, tags), args.out_tags, "out_tags")
-    console.print(f"{len(lights)} frames with lights, {len(tags)} with the tag", highlight=False)
+    messages().print(f"{len(lights)} frames with lights, {len(tags)} with the tag", highlight=False)
     return 0
 
 

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvdock.cli import exit_codes
+from auvdock.cli.console import counting_progress, output
 from auvdock.cli.parsing import parse
+from auvdock.cli.saving import Saving
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.envs.config import FIDELITIES
@@ -67,20 +68,21 @@ def run_landing_trials(argv: Sequence[str], prog: str) -> int:
         make_folder(args.out)
     cfg = trial_cfg(args.fidelity, {"world": {"water": args.water}})
     seeds = range(args.seed, args.seed + args.trials)
-    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+    with counting_progress() as progress:
         task = progress.add_task("landings", total=args.trials * len(args.levels))
         trials = fly_trials(cfg, seeds, args.levels, lambda: progress.advance(task))
     summaries = [summarise(trials, name) for name in args.levels]
     cells, comparisons = range_cells(trials), compare(trials)
     report = _report(args, summaries, cells, comparisons)
+    saving = Saving()
     if args.out is not None:
-        _write(args.out, args, trials, cells, report)
+        _write(args.out, args, trials, cells, report, saving)
     if args.json:
         print(json.dumps(report, allow_nan=False))
     else:
         _print(summaries, cells, comparisons)
-    return 0 if all(_good(summary) for summary in summaries if summary.levels == "both") else 1
+    good = all(_good(summary) for summary in summaries if summary.levels == "both")
+    return saving.finish(exit_codes.DONE if good else exit_codes.NOT_MET)
 
 
 def _check(args: LandingTrials) -> None:
@@ -120,13 +122,18 @@ def _report(
 
 
 def _write(
-    out: Path, args: LandingTrials, trials: Sequence[LandingTrial], cells: Sequence[RangeCell], report: dict[str, Any]
+    out: Path,
+    args: LandingTrials,
+    trials: Sequence[LandingTrial],
+    cells: Sequence[RangeCell],
+    report: dict[str, Any],
+    saving: Saving,
 ) -> None:
     shown = [trial for trial in trials if trial.levels == args.levels[0]][: int(PAPER["shown"])]
-    draw_paths_15(out / "landing_paths.png", shown)
-    draw_curves_16(out / "landing_curves.png", shown)
+    saving.attempt(out / "landing_paths.png", lambda path: draw_paths_15(path, shown))
+    saving.attempt(out / "landing_curves.png", lambda path: draw_curves_16(path, shown))
     title = f"Error against range: {args.fidelity}, water {args.water}, {len(trials)} flights"
-    draw_ranges(out / "landing_ranges.png", cells, title)
+    saving.attempt(out / "landing_ranges.png", lambda path: draw_ranges(path, cells, title))
     curves = [
         {
             "seed": trial.seed,
@@ -139,8 +146,7 @@ def _write(
         }
         for trial in trials
     ]
-    text = json.dumps({**report, "flights": curves}, allow_nan=False)
-    (out / "trials.json").write_text(text, encoding="utf-8")
+    saving.text(out / "trials.json", json.dumps({**report, "flights": curves}, allow_nan=False))
 
 
 def _numbers(values: Array) -> list[float | None]:
@@ -149,7 +155,7 @@ def _numbers(values: Array) -> list[float | None]:
 
 
 def _print(summaries: Sequence[TrialSummary], cells: Sequence[RangeCell], comparisons: Sequence[Comparison]) -> None:
-    console = Console()
+    console = output()
     table = Table(title="paper C's landing trials; estimate against truth after alignment", title_justify="left")
     names = (
         "flown by",

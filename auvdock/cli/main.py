@@ -1,14 +1,19 @@
-"""`auvdock COMMAND ...`: finds and runs the command; what a user can mend becomes one line and exit code 2."""
+"""`auvdock COMMAND ...`: finds and runs it; whatever goes wrong becomes one line and an exit code of its own."""
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
 from importlib import import_module
 
+from auvdock.cli import exit_codes
+from auvdock.cli.console import tell
+from auvdock.cli.crash import report_crash
 from auvdock.cli.notices import told_once, unusable_gl
+from auvdock.cli.streams import forgiving_streams
 from auvdock.core.errors import AuvdockError
 from auvdock.core.memory import relax_collector
 
@@ -70,9 +75,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a command line.
 
     Returns:
-        0 on success, 1 if an episode failed to dock, 2 on input that cannot be used, 130 if interrupted.
+        One of `auvdock.cli.exit_codes`: 0 on success, 1 if an episode failed to dock, 2 on input that cannot be used,
+        70 after an exception that nobody foresaw, 74 or 75 if something could not be written (0 or 1 otherwise), 130 if
+        interrupted, 141 if nobody reads standard output any more.
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    with forgiving_streams() as (out, _):
+        code = _answer(words)
+        out.flush()
+        if out.error is None:
+            return code
+        if out.error.errno == errno.EPIPE:
+            return exit_codes.BROKEN_PIPE
+        tell(f"error: standard output could not be written: {out.error.strerror}")
+        return exit_codes.with_unwritten(code)
+
+
+def _answer(words: list[str]) -> int:
     try:
         command = _find(words)
         if command is None:
@@ -88,14 +107,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         unusable_gl()
         return code
     except AuvdockError as error:
-        print(f"auvdock: error: {error}", file=sys.stderr)
-        return 2
+        tell(f"error: {error}")
+        return exit_codes.BAD_INPUT
     except KeyboardInterrupt:
-        print("auvdock: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 141
+        tell("interrupted")
+        return exit_codes.INTERRUPTED
+    except SystemExit as stop:  # tyro's, after --help or a flag that it does not understand
+        return exit_codes.DONE if stop.code is None else int(stop.code)
+    except Exception as error:
+        report_crash(error, words)
+        return exit_codes.FAULT
 
 
 def _find_modules_here() -> None:
@@ -109,7 +130,7 @@ def _find_modules_here() -> None:
 
 
 def _tell_of_compiling() -> None:
-    print("auvdock: compiling inner loops, once after an installation: up to a minute", file=sys.stderr, flush=True)
+    tell("compiling inner loops, once after an installation: up to a minute")
 
 
 def _find(words: Sequence[str]) -> tuple[str, ...] | None:
@@ -126,12 +147,12 @@ def _usage(words: Sequence[str]) -> int:
         from auvdock import __version__
 
         print(__version__)
-        return 0
+        return exit_codes.DONE
     if words and not asked:
         known = ", ".join(" ".join(command) for command in COMMANDS)
-        print(f"auvdock: error: command: {' '.join(words[:2])!r} is unknown; give one of: {known}", file=out)
-        return 2
+        tell(f"error: command: {' '.join(words[:2])!r} is unknown; give one of: {known}")
+        return exit_codes.BAD_INPUT
     print("usage: auvdock COMMAND [--help] ...\n", file=out)
     for command, (_, summary) in COMMANDS.items():
         print(f"  {' '.join(command):26s} {summary}", file=out)
-    return 0 if asked else 2
+    return exit_codes.DONE if asked else exit_codes.BAD_INPUT

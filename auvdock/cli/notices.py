@@ -8,6 +8,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from typing import TextIO
 
+from auvdock.cli.console import tell
 from auvdock.core.errors import AuvdockWarning
 
 __all__ = ["told_once", "unusable_gl"]
@@ -33,7 +34,7 @@ def told_once() -> Generator[None]:
                 others(message, category, filename, lineno, file, line)
             elif category not in told:
                 told.add(category)
-                print(f"auvdock: {message}", file=sys.stderr, flush=True)
+                tell(str(message))
 
         warnings.showwarning = show
         yield
@@ -43,4 +44,4 @@ def unusable_gl() -> None:
     """Tell that MUJOCO_GL cannot be used, if MuJoCo was loaded and said so; a command without images needs none."""
     refusal: str | None = getattr(sys.modules.get("auvdock.sim.mj"), "GL_REFUSAL", None)
     if refusal is not None:
-        print(f"auvdock: no images: {refusal}", file=sys.stderr)
+        tell(f"no images: {refusal}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -13,10 +12,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvdock.cli import exit_codes
+from auvdock.cli.console import command_line, counting_progress, output, shown
 from auvdock.cli.parsing import parse
+from auvdock.cli.saving import Saving
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import CameraCfg
@@ -87,14 +88,13 @@ def run(argv: Sequence[str], prog: str) -> int:
     cases = variants(station) if args.sweep else []
     search = _search(args, station)
     layouts = search.population * (search.generations + 1) if search is not None else 0
-    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     started = time.perf_counter()
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+    with counting_progress() as progress:
         task = progress.add_task("region", total=1 + len(cases) + layouts + (3 if args.out else 0))
         space = guidance_space(layout, cfg, sees)
         region_s = time.perf_counter() - started
         progress.advance(task)
-        files: list[str] = []
+        saving = Saving()
         spaces = {"station": space}
         optimised: dict[str, Any] | None = None
         flown = args.station
@@ -105,36 +105,36 @@ def run(argv: Sequence[str], prog: str) -> int:
             spaces["optimised"] = guidance_space(best, cfg)
             optimised = _optimised(search, found, spaces["optimised"])
             if args.out is not None:
+                designed = with_lights(station, best)
                 flown = args.out / "optimised.toml"
-                write_station(flown, with_lights(station, best))
-                files.append("optimised.toml")
+                saving.attempt(flown, lambda path: write_station(path, designed))
         if args.out is not None:
-            title = f"{args.station.stem} in {args.water}: {space.volume_m3:.0f} m³"
+            name = shown(args.station.stem)
+            title = f"{name} in {args.water}: {space.volume_m3:.0f} m³"
             panels = section_panels(sees, layout, space, lambda: progress.advance(task), min(64, args.resolution + 8))
-            draw_sections(args.out / "sections.png", title, panels, cfg.min_lights)
-            record_region(args.out / "region.rrd", layout, spaces)
-            files += ["sections.png", "region.rrd"]
+            saving.attempt(args.out / "sections.png", lambda path: draw_sections(path, title, panels, cfg.min_lights))
+            saving.attempt(args.out / "region.rrd", lambda path: record_region(path, layout, spaces))
         points = sweep(cases, cfg, lambda: progress.advance(task)) if cases else []
         if args.out is not None and points:
-            draw_curves(args.out / "sweeps.png", f"{args.station.stem} in {args.water}", _curves(points))
-            files.append("sweeps.png")
-    report = _report(args, space, region_s, points, files)
+            title = f"{shown(args.station.stem)} in {args.water}"
+            saving.attempt(args.out / "sweeps.png", lambda path: draw_curves(path, title, _curves(points)))
+    report = _report(args, space, region_s, points, saving.written)
     report["optimised"] = optimised
     report["fly_it"] = _flying(args, station, flown)
     if args.json:
         print(json.dumps(report, allow_nan=False))
     else:
         _print(report, points)
-    return 0
+    return saving.finish(exit_codes.DONE)
 
 
 def _flying(args: Plan, station: ConicalStationCfg, file: Path) -> str:
     """The command that docks into the planned station."""
     kind = "conical" if station.rotating is None else "rotating"
-    words = ["auvdock", "dock", kind, "--station", str(file), "--water", args.water]
+    words: list[str | Path] = ["auvdock", "dock", kind, "--station", file, "--water", args.water]
     if args.attenuation is not None:
         words += ["--attenuation", f"{args.attenuation:g}"]
-    return shlex.join(words)
+    return command_line(*words)
 
 
 def section_panels(
@@ -237,12 +237,12 @@ def _report(
         "places_evaluated": space.region.evaluations if space.region is not None else 0,
         "wall_s": region_s,
         "sweep": [asdict(point) for point in points],
-        "files": [str(args.out / name) for name in files] if args.out is not None else [],
+        "files": files,
     }
 
 
 def _print(report: dict[str, Any], points: list[SweepPoint]) -> None:
-    console = Console()
+    console = output()
     table = Table(title=f"guidance space of {report['station']} in {report['water']}", title_justify="left")
     table.add_column("measure")
     table.add_column("value", justify="right")
@@ -277,8 +277,8 @@ def _print(report: dict[str, Any], points: list[SweepPoint]) -> None:
             )
         console.print(table)
     for name in report["files"]:
-        console.print(name, highlight=False)
-    print(f"fly it: {report['fly_it']}")  # as it is, in one line: to be copied
+        console.print(name, highlight=False, soft_wrap=True)
+    console.print(f"fly it: {report['fly_it']}", highlight=False, soft_wrap=True)
 
 
 def _print_optimised(console: Console, report: dict[str, Any]) -> None:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvdock.cli import exit_codes
+from auvdock.cli.console import command_line, counting_progress, output
 from auvdock.cli.parsing import parse
+from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.core.station import load_conical_station
 from auvdock.experiments.guidance_space_design import (
@@ -75,9 +75,8 @@ def run_guidance_design(argv: Sequence[str], prog: str) -> int:
     cfg = default_search()
     search = dataclasses.replace(cfg, cone_deg=args.cone)
     layouts = cfg.population * (cfg.generations + 1)
-    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     campaigns: list[Campaign] = []
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+    with counting_progress() as progress:
         task = progress.add_task("layouts in paper A's model", total=layouts)
         paper = compare_paper(cfg, args.seed, lambda: progress.advance(task))
         second = progress.add_task(f"layouts in {args.water}", total=layouts)
@@ -88,22 +87,21 @@ def run_guidance_design(argv: Sequence[str], prog: str) -> int:
             for name, station in stations.items():
                 campaigns.append(dock_campaign(name, station, args.water, args.episodes, workers=args.workers))
                 progress.advance(third)
-    files: list[str] = []
+    saving = Saving()
     fly_it: str | None = None
     if args.out is not None:
-        draw_comparison(args.out / "guidance_design.png", physical, paper)
+        saving.attempt(args.out / "guidance_design.png", lambda path: draw_comparison(path, physical, paper))
         station_file = args.out / f"optimised_{Path(args.water).stem}.toml"
-        write_station(station_file, physical.station)
-        files = [str(args.out / "guidance_design.png"), str(station_file)]
-        fly_it = shlex.join(["auvdock", "dock", "conical", "--station", str(station_file), "--water", args.water])
-    report = _report(paper, physical, campaigns, files, args.cone)
+        saving.attempt(station_file, lambda path: write_station(path, physical.station))
+        fly_it = command_line("auvdock", "dock", "conical", "--station", station_file, "--water", args.water)
+    report = _report(paper, physical, campaigns, saving.written, args.cone)
     report["fly_it"] = fly_it
     if args.json:
         print(json.dumps(report, allow_nan=False))
     else:
         _print(report)
     better = paper.best_m3 > paper.ring_m3 and physical.found.score > physical.found.start_score
-    return 0 if better else 1
+    return saving.finish(exit_codes.DONE if better else exit_codes.NOT_MET)
 
 
 def _report(
@@ -143,7 +141,7 @@ def _report(
 
 
 def _print(report: dict[str, Any]) -> None:
-    console = Console()
+    console = output()
     table = Table(title="six lights, equal power", title_justify="left")
     for name in ("model", "paper's ring m³", "optimised m³", "gain", "beam °"):
         table.add_column(name, justify="left" if name == "model" else "right")
@@ -168,6 +166,6 @@ def _print(report: dict[str, Any]) -> None:
             table.add_row(row["name"], f"{row['docked']}/{row['episodes']}", *values)
         console.print(table)
     for name in report["files"]:
-        console.print(name, highlight=False)
+        console.print(name, highlight=False, soft_wrap=True)
     if report["fly_it"] is not None:
-        print(f"fly it: {report['fly_it']}")
+        console.print(f"fly it: {report['fly_it']}", highlight=False, soft_wrap=True)

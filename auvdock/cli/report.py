@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.console import Console
 
 from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.plan import Plan
@@ -17,7 +16,11 @@ from auvdock.campaign.report.cells import Campaign, load
 from auvdock.campaign.report.compare import Comparison, compare
 from auvdock.campaign.report.page import html_page, recording_path
 from auvdock.campaign.report.tables import csv_table, latex_table
+from auvdock.cli import exit_codes
+from auvdock.cli.console import output
 from auvdock.cli.parsing import parse
+from auvdock.cli.recorded import run_recorded
+from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.episode.runner import EpisodeRunner
 
@@ -50,7 +53,8 @@ def run(argv: Sequence[str], prog: str) -> int:
     if not campaign.rows:
         raise CampaignError(f"{args.folder}: no episode has finished yet; run sweep with --resume")
     comparison = compare(campaign, load(args.against)) if args.against else None
-    _record(campaign, args.record_failures)
+    saving = Saving()
+    _record(campaign, args.record_failures, saving)
     page = args.folder / "report.html"
     try:
         page.write_text(html_page(campaign, comparison), encoding="utf-8")
@@ -62,29 +66,28 @@ def run(argv: Sequence[str], prog: str) -> int:
         print(json.dumps(_plain(campaign, comparison, page)))
     else:
         rate = campaign.rate
-        console = Console()
+        console = output()
         shares = f"{100 * (rate.rate or 0.0):.1f} % [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
         console.print(f"success {shares} in {rate.episodes} episodes", highlight=False)
         if comparison:
             test = comparison.test
-            console.print(f"against {args.against}: {100 * test.difference:+.1f} points, p = {test.p_value:.3g}")
+            points = f"{100 * test.difference:+.1f} points, p = {test.p_value:.3g}"
+            console.print(f"against {args.against}: {points}", soft_wrap=True)
         console.print(f"page: {page}\ntables: {page.with_suffix('.csv')}, {page.with_suffix('.tex')}", soft_wrap=True)
-    return 0
+    return saving.finish(exit_codes.DONE)
 
 
-def _record(campaign: Campaign, count: int) -> None:
+def _record(campaign: Campaign, count: int, saving: Saving) -> None:
     """Recordings of the first failures, as far as they are not there."""
     failed = [int(row["episode"] or 0) for row in campaign.rows if row["success"] is not True and row["error"] is None]
     wanted = [number for number in failed[:count] if not recording_path(campaign.folder, number).exists()]
-    if not wanted:
-        return
-    from auvdock.recording.rerun_recorder import RerunRecorder
-
     plan = Plan(campaign.cfg)
     for number in wanted:
         path = recording_path(campaign.folder, number)
         spec = plan[number]
-        EpisodeRunner(plan.config(spec)).run(spec.seed, [RerunRecorder(path)])
+        run_recorded(EpisodeRunner(plan.config(spec)), spec.seed, path, saving)
+        if str(path) not in saving.written:
+            path.unlink(missing_ok=True)  # or the next report would take it for whole
 
 
 def _plain(campaign: Campaign, comparison: Comparison | None, page: Path) -> dict[str, object]:

@@ -8,11 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvdock.cli import exit_codes
+from auvdock.cli.console import counting_progress, output
 from auvdock.cli.parsing import parse
+from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.experiments.guidance_space import (
     CELLS,
@@ -47,8 +48,7 @@ def run_guidance_space(argv: Sequence[str], prog: str) -> int:
     args = parse(GuidanceSpace, argv, prog)
     if args.workers is not None and args.workers < 1:
         raise ConfigError("workers", args.workers, "1 or more")
-    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+    with counting_progress() as progress:
         task = progress.add_task("cells and readings", total=task_count())
         report = reproduce(lambda: progress.advance(task), args.workers)
     if args.json:
@@ -75,7 +75,7 @@ def _plain(cells: Sequence[CellResult], readings: Sequence[ReadingResult], withi
 
 
 def _print(cells: Sequence[CellResult], readings: Sequence[ReadingResult], within: int) -> None:
-    console = Console()
+    console = output()
     for number, title in ((4, "table 4: lights and beam angle"), (5, "table 5: six lights of 45°, inward tilt")):
         table = Table(title=f"paper A, {title}; volumes in m³", title_justify="left")
         for name in ("angle °", "lights", "tilt °", "paper", "ours", "difference", "fine hull", "converged", "voxels"):
@@ -142,9 +142,9 @@ def run_guidance_region(argv: Sequence[str], prog: str) -> int:
         load_water(water)
     if args.out is not None:
         make_folder(args.out)
-    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     rows: list[dict[str, Any]] = []
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+    saving = Saving()
+    with counting_progress() as progress:
         for water, step_m in zip(args.waters, args.steps, strict=True):
             grid = check_grid(water, step_m)
             task = progress.add_task(f"poses in {water}", total=len(grid[0]))
@@ -152,7 +152,7 @@ def run_guidance_region(argv: Sequence[str], prog: str) -> int:
             picture = None
             if args.out is not None:
                 picture = args.out / f"guidance_region_{water}.png"
-                draw_agreement(picture, agreement)
+                saving.attempt(picture, lambda path: draw_agreement(path, agreement))  # noqa: B023 - called at once
             rows.append(
                 {
                     "water": water,
@@ -161,18 +161,18 @@ def run_guidance_region(argv: Sequence[str], prog: str) -> int:
                     "planned": int(agreement.planned.sum()),
                     "seen": int(agreement.seen.sum()),
                     "intersection_over_union": agreement.intersection_over_union,
-                    "picture": str(picture) if picture is not None else None,
+                    "picture": str(picture) if str(picture) in saving.written else None,
                 }
             )
     good = all(row["intersection_over_union"] >= 0.8 for row in rows)
     if args.json:
         print(json.dumps({"waters": rows, "target": 0.8}, allow_nan=False))
-        return 0 if good else 1
+        return saving.finish(exit_codes.DONE if good else exit_codes.NOT_MET)
     table = Table(title="planned region against rendered frames", title_justify="left")
     for name in ("water", "places", "planned", "seen", "intersection over union"):
         table.add_column(name, justify="left" if name == "water" else "right")
     for row in rows:
         ratio = row["intersection_over_union"]
         table.add_row(row["water"], str(row["places"]), str(row["planned"]), str(row["seen"]), f"{ratio:.3f}")
-    Console().print(table)
-    return 0 if good else 1
+    output().print(table)
+    return saving.finish(exit_codes.DONE if good else exit_codes.NOT_MET)

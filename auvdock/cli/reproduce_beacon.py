@@ -11,10 +11,12 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvdock.cli import exit_codes
+from auvdock.cli.console import counting_progress, output
 from auvdock.cli.parsing import parse
+from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.experiments.kept import Kept
 from auvdock.experiments.rotating_limits import SHARE_TURNS, Limit, Sight, flash_sights, limits
@@ -122,11 +124,10 @@ def _run(args: Azimuth, kind: _Kind) -> int:
     with_images = args.fidelity == "pixels"
     count = len(PLACES) * args.videos + (len(SCENARIOS) * scenario_videos if with_scenarios else 0)
     count += 2 * len(X_M) if with_images else 0
-    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
     scenarios: list[ScenarioRow] = []
     sights: list[Sight] = []
     kept = Kept(None if args.out is None else args.out / "watches.jsonl")
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+    with counting_progress() as progress:
         task = progress.add_task("videos", total=count)
         shared = (args.turns, args.fidelity, args.workers, lambda: progress.advance(task))
         watches = run_videos(PLACES, args.videos, *shared, kept=kept)
@@ -139,17 +140,20 @@ def _run(args: Azimuth, kind: _Kind) -> int:
     report = _report(args, kind, watches, scenarios)
     report["limits"] = [asdict(limit) for limit in farthest]
     report["git_revisions"] = sorted(str(revision) for revision in kept.revisions)
+    saving = Saving()
     if args.out is not None:
         picture = args.out / f"{kind.name}.png"
-        draw_errors(picture, kind.title, kind.paper, watches, kind.ours, kind.paper_method)
-        report["picture"] = str(picture)
+        saving.attempt(
+            picture, lambda path: draw_errors(path, kind.title, kind.paper, watches, kind.ours, kind.paper_method)
+        )
+        report["picture"] = str(picture) if saving.written else None
         text = json.dumps({**report, "videos": [asdict(watch) for watch in watches]}, allow_nan=False, indent=1)
-        (args.out / f"{kind.name}.json").write_text(text, encoding="utf-8")
+        saving.text(args.out / f"{kind.name}.json", text)
     if args.json:
         print(json.dumps(report, allow_nan=False))
     else:
         _print(kind, report, farthest, scenarios)
-    return 0 if report["within_target"] else 1
+    return saving.finish(exit_codes.DONE if report["within_target"] else exit_codes.NOT_MET)
 
 
 def _report(args: Azimuth, kind: _Kind, watches: Sequence[Watch], scenarios: Sequence[ScenarioRow]) -> dict[str, Any]:
@@ -207,7 +211,7 @@ def _cell(kind: _Kind, group: Sequence[Watch]) -> dict[str, Any]:
 
 
 def _print(kind: _Kind, report: dict[str, Any], farthest: Sequence[Limit], scenarios: Sequence[ScenarioRow]) -> None:
-    console = Console()
+    console = output()
     table = Table(
         title=f"paper B, {kind.title}; mean |error| in °: paper / its method here / ours", title_justify="left"
     )

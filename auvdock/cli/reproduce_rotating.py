@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import cv2
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from auvdock.campaign.statistics import McNemar, Rate
+from auvdock.cli import exit_codes
+from auvdock.cli.console import counting_progress, output
 from auvdock.cli.parsing import parse
+from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.experiments.kept import Kept
 from auvdock.experiments.rotating_docking import (
@@ -73,8 +74,8 @@ def run_rotating_docking(argv: Sequence[str], prog: str) -> int:
     seeds = range(args.first_seed, args.first_seed + args.episodes)
     flown: dict[str, tuple[Flight, ...]] = {}
     kept = Kept(None if args.out is None else args.out / "flights.jsonl")
-    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+    saving = Saving()
+    with counting_progress() as progress:
         for arm in arms:
             task = progress.add_task(arm.title, total=len(seeds))
             flown[arm.name] = fly_arm(
@@ -86,7 +87,7 @@ def run_rotating_docking(argv: Sequence[str], prog: str) -> int:
                 kept,
             )
             if args.out is not None:
-                _store(args.out, flown)
+                saving.text(args.out / "rotating_docking.json", _rows(flown))
     kept.close()
     summaries = [summarise(arm, flown[arm.name]) for arm in arms]
     tests = {}
@@ -94,16 +95,17 @@ def run_rotating_docking(argv: Sequence[str], prog: str) -> int:
         tests = {name: paired(flown["beacon"], flights) for name, flights in flown.items() if name != "beacon"}
     if args.out is not None:
         panels = [(arm, flown[arm.name]) for arm in arms if arm.name in ("beacon", "fixed")]
-        draw_tracks(args.out / "rotating_docking.png", panels or [(arms[0], flown[arms[0].name])])
+        drawn = panels or [(arms[0], flown[arms[0].name])]
+        saving.attempt(args.out / "rotating_docking.png", lambda path: draw_tracks(path, drawn))
     met = {s.arm.name: (s.docked.rate or 0.0) >= TARGETS[s.arm.name] for s in summaries if s.arm.name in TARGETS}
     if args.json:
         print(json.dumps(_plain(args, summaries, tests, met, kept), allow_nan=False))
     else:
         _print(summaries, tests)
-    return 0 if all(met.values()) else 1
+    return saving.finish(exit_codes.DONE if all(met.values()) else exit_codes.NOT_MET)
 
 
-def _store(folder: Path, flown: dict[str, tuple[Flight, ...]]) -> None:
+def _rows(flown: dict[str, tuple[Flight, ...]]) -> str:
     rows: dict[str, list[dict[str, Any]]] = {}
     for name, flights in flown.items():
         rows[name] = []
@@ -111,7 +113,7 @@ def _store(folder: Path, flown: dict[str, tuple[Flight, ...]]) -> None:
             row = flight.result.to_json()
             del row["config"], row["versions"]  # of all the same; flights.jsonl has the versions
             rows[name].append(row)
-    (folder / "rotating_docking.json").write_text(json.dumps(rows, allow_nan=False), encoding="utf-8")
+    return json.dumps(rows, allow_nan=False)
 
 
 def _plain(
@@ -140,7 +142,7 @@ def _plain(
 
 
 def _print(summaries: Sequence[ArmSummary], tests: dict[str, McNemar]) -> None:
-    console = Console()
+    console = output()
     # Two narrow tables: one of all columns is not legible in a terminal of 80.
     table = _table("docked; 95 % intervals after Wilson", ("arm", "of all", "began in front", "began behind"))
     for s in summaries:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
-from rich.console import Console
 from rich.table import Table
 
 from auvdock.campaign.axes import AxisCfg, axis_kind
@@ -27,6 +26,7 @@ from auvdock.campaign.plan import Plan
 from auvdock.campaign.process import ProcessExecutor, usable_cores
 from auvdock.campaign.provenance import manifest_of
 from auvdock.campaign.store import Store, read_campaign
+from auvdock.cli.console import command_line, messages, output, tell
 from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, parse, station_file, with_station
 from auvdock.cli.sweep_progress import SweepProgress
 from auvdock.core.errors import ConfigError
@@ -168,8 +168,8 @@ def run(argv: Sequence[str], prog: str) -> int:
     executor = _executor(args, cfg)
     store = Store(args.out, cfg, manifest_of(cfg), args.resume)
     if store.is_mixed:
-        print("auvdock: earlier episodes were run by other versions; rows may not repeat", file=sys.stderr)
-    observer = SweepProgress(Console(stderr=True), executor.workers, quiet=args.json)
+        tell("earlier episodes were run by other versions; rows may not repeat")
+    observer = SweepProgress(messages(), executor.workers, quiet=args.json)
     with redirect_stdout(sys.stderr):  # Ray tells of lost nodes on standard output, which belongs to the summary
         summary = run_campaign(cfg, DockingJob(cfg), store, executor, observer)
     if args.json:
@@ -314,6 +314,6 @@ def _print(summary: CampaignSummary, out: Path) -> None:
     table.add_row("run now", str(summary.ran))
     table.add_row("wall-clock time", f"{summary.wall_s:.0f} s")
     table.add_row("peak memory", f"{summary.peak_rss_mb:.0f} MiB")
-    console = Console()
+    console = output()
     console.print(table)
-    console.print(f"next: auvdock report {out}", highlight=False)
+    console.print(f"next: {command_line('auvdock', 'report', out)}", highlight=False, soft_wrap=True)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress
 
 from auvdock.campaign.campaign import Tally
 from auvdock.campaign.row import Row
+from auvdock.cli.console import description, live
 
 __all__ = ["SweepProgress"]
 
@@ -40,8 +41,7 @@ class SweepProgress:
         plural = "" if self._workers == 1 else "s"
         self._console.print(f"auvdock: {planned} episodes{there}, {self._workers} worker{plural}", highlight=False)
         if self._console.is_terminal:
-            columns = (BarColumn(30), TextColumn("{task.description}"))
-            self._progress = Progress(*columns, console=self._console, transient=True)
+            self._progress = live(self._console, BarColumn(30), description())
             self._progress.add_task(
                 "starting; a new installation first compiles, up to a minute", total=planned, completed=tally.episodes
             )

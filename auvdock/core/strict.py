@@ -29,15 +29,17 @@ T = TypeVar("T")
 
 
 def read_toml(path: Path | Traversable) -> dict[str, Any]:
-    """Parse a TOML file.
+    """Parse a TOML file in UTF-8, with or without the byte-order mark that some editors put first.
 
     Raises:
         ConfigError: the file is missing or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError("file", str(path), f"a readable TOML file ({error})") from error
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:  # ValueError: a name with a NUL in it, or bytes that are no UTF-8
+        raise ConfigError("file", str(path), f"a readable TOML file in UTF-8 ({error})") from error
+    try:
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # of tomllib: no TOML, a number too long, tables too deep
         raise ConfigError("file", str(path), f"valid TOML ({error})") from error
 

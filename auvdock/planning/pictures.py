@@ -62,7 +62,7 @@ def draw_sections(path: Path, title: str, panels: list[Panel], needed: int) -> N
         ConfigError: the file cannot be written.
     """
     figure = Figure(figsize=(5.4 * len(panels), 5.2), layout="constrained")
-    figure.suptitle(title)
+    figure.suptitle(title, parse_math=False)  # it may bear a file's name, with a dollar sign in it
     # One colour for each number of lights: the region begins where the strong blue does.
     shift = max(needed - 4, 0)
     colours = ListedColormap([_COLOURS[max(k - shift, 0)] for k in range(len(_COLOURS))])
@@ -96,7 +96,7 @@ def draw_sections(path: Path, title: str, panels: list[Panel], needed: int) -> N
 def draw_curves(path: Path, title: str, curves: list[tuple[str, Array, Array]]) -> None:
     """Write a picture of sweeps: name of the swept quantity, its values (n,), volumes (n,) in m³."""
     figure = Figure(figsize=(4.2 * len(curves), 3.6), layout="constrained")
-    figure.suptitle(title)
+    figure.suptitle(title, parse_math=False)  # it may bear a file's name, with a dollar sign in it
     for index, (name, values, volumes) in enumerate(curves):
         axes: Axes = figure.add_subplot(1, len(curves), index + 1)
         axes.plot(values, volumes, "o-", color="#1f4e79")

@@ -24,12 +24,7 @@ def record_region(path: Path, layout: BeaconLayout, spaces: dict[str, GuidanceSp
         ConfigError: the file cannot be written.
     """
     recording = rr.RecordingStream("auvdock guidance space")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.open("wb").close()
-        recording.save(str(path))
-    except OSError as error:
-        raise ConfigError("out", str(path), f"a file that can be written ({error.strerror})") from error
+    written = recording.binary_stream()  # Rerun's own file sink would hang on a full disk
     recording.log("station", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     blue = np.array([70, 120, 255], dtype=np.uint8)
     red = np.array([255, 60, 40], dtype=np.uint8)
@@ -49,5 +44,10 @@ def record_region(path: Path, layout: BeaconLayout, spaces: dict[str, GuidanceSp
         half = np.full((len(surface), 3), 0.5 * space.region.voxel_m)
         voxels = rr.Boxes3D(centers=surface, half_sizes=half, colors=shade, fill_mode=rr.components.FillMode.Solid)
         recording.log(f"region/{name}", voxels, static=True)
-    recording.flush()
+    data = written.read()
     recording.disconnect()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data or b"")
+    except OSError as error:
+        raise ConfigError("out", str(path), f"a file that can be written ({error.strerror})") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from auvdock.core.arrays import Image
 from auvdock.core.errors import AuvdockError, ConfigError
 from auvdock.recording import paths
 from auvdock.recording.columns import ColumnWriter, Row
+from auvdock.recording.file import RecordingFile
 from auvdock.recording.layout import make_blueprint
 from auvdock.recording.scene import log_scene
 from auvdock.recording.summary import result_document, unfinished_document
@@ -23,10 +25,14 @@ if TYPE_CHECKING:
     from auvdock.episode.result import EpisodeResult
     from auvdock.episode.trace import EpisodeSetup, Tick
 
-__all__ = ["RerunRecorder"]
+__all__ = ["RecordingWarning", "RerunRecorder"]
 
 _BATCH_ROWS = 256
 _BATCH_WALL_S = 0.5
+
+
+class RecordingWarning(UserWarning):
+    """A recording is incomplete, its file could not be written any further."""
 
 
 class RerunRecorder:
@@ -35,6 +41,9 @@ class RerunRecorder:
     Control periods are gathered and written in batches of at most 256, or half a second of wall-clock time: writing
     each by itself would cost more than simulating it. Each batch reaches the file at once, so a killed run leaves a
     recording that lacks its last half second. Each recorder has a stream of its own; several can be open side by side.
+
+    A file that cannot be written any further, on a full disk say, ends the recording and not the episode: `failure`
+    says why, and `close` warns of it by a `RecordingWarning`.
     """
 
     def __init__(self, path: Path, *, image_every: int = 1, jpeg_quality: int = 80) -> None:
@@ -54,10 +63,13 @@ class RerunRecorder:
             raise ConfigError("jpeg_quality", jpeg_quality, "1 to 100")
         _check_writable(path)
         self.path = path
+        self.failure: str | None = None
+        """Why the last recording is incomplete; None if it is whole, or was not begun."""
         self._image_every = image_every
         self._jpeg_options = (cv2.IMWRITE_JPEG_QUALITY, jpeg_quality)
         self._setup: EpisodeSetup | None = None
         self._stream: rr.RecordingStream | None = None
+        self._file: RecordingFile | None = None
         self._writer: ColumnWriter | None = None
         self._rows: list[Row] = []
         self._frame = 0
@@ -68,18 +80,22 @@ class RerunRecorder:
         """Open the file and write what stays the same.
 
         Raises:
-            AuvdockError: the environment switches Rerun off.
+            AuvdockError: the environment switches Rerun off, or the file can no longer be written.
         """
         self.close()
+        self.failure = None
         stream = rr.RecordingStream(paths.APPLICATION_ID)
         if not rr.is_enabled(stream):
             raise AuvdockError("the environment variable RERUN switches recordings off; unset it to record")
-        stream.save(self.path)
+        try:
+            self._file = RecordingFile(stream, self.path)
+        except OSError as error:
+            raise _unwritable(self.path, error) from error
         stream.send_recording_name(setup.title)
         stream.send_blueprint(make_blueprint(setup))
         log_scene(stream, setup)
         _log_document(stream, unfinished_document(setup))
-        stream.flush()
+        self._file.flush()
         self._setup, self._stream, self._writer = setup, stream, ColumnWriter(stream, setup)
         self._frame = self._images = 0
 
@@ -102,19 +118,26 @@ class RerunRecorder:
 
     def close(self) -> None:
         """Write what is left and close the file; does nothing if it is closed."""
-        self._write_batch()
-        if self._stream is not None:
-            self._stream.flush()
-            self._stream.disconnect()
-        self._setup = self._stream = self._writer = None
+        try:
+            self._write_batch()
+        finally:
+            file, self._file = self._file, None
+            self._setup = self._stream = self._writer = None
+            if file is not None:
+                file.close()
+                self.failure = file.failure
+        if file is not None and self.failure is not None:
+            warnings.warn(f"{self.path} is incomplete: {self.failure}", RecordingWarning, stacklevel=2)
 
     def _write_batch(self) -> None:
         rows, self._rows = self._rows, []
         if not rows:
             return
-        if self._writer is None:
+        if self._writer is None or self._file is None:
             raise RuntimeError("a tick came before on_start or after close")
-        self._writer.write(rows)
+        if self._file.failure is None:
+            self._writer.write(rows)
+            self._file.flush()
 
     def _encode(self, image: Image | None) -> bytes | None:
         """The image as JPEG if it is one to record; a black one before the first, so that marks have a ground."""
@@ -135,6 +158,7 @@ class RerunRecorder:
 
 
 def _log_document(stream: rr.RecordingStream, text: str) -> None:
+    text = text.encode("utf-8", "replace").decode()  # it may name a file whose name is no text
     stream.log(paths.SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True, strict=True)
 
 
@@ -142,13 +166,17 @@ def _check_writable(path: Path) -> None:
     """Raise ConfigError unless `path` can be opened for writing; leaves the folder as it was."""
     if path.suffix != ".rrd":
         raise ConfigError("record", str(path), "a file name that ends in .rrd")
-    if not path.parent.is_dir():
-        raise ConfigError("record", str(path), f"a file in a folder that exists; {path.parent} does not")
-    existed = path.exists()
     try:
+        if not path.parent.is_dir():
+            raise ConfigError("record", str(path), f"a file in a folder that exists; {path.parent} does not")
+        existed = path.exists()
         with path.open("ab"):
             pass
         if not existed:
             path.unlink()
     except OSError as error:
-        raise ConfigError("record", str(path), f"a file that can be written ({error.strerror})") from error
+        raise _unwritable(path, error) from error
+
+
+def _unwritable(path: Path, error: OSError) -> ConfigError:
+    return ConfigError("record", str(path), f"a file that can be written ({error.strerror})")

@@ -56,6 +56,7 @@ DISTRIBUTIONS = (
 _styled = rc_context(
     {
         "svg.fonttype": "none",  # text stays text: it can be searched and copied
+        "text.parse_math": False,  # names of one's own may have a dollar sign
         "font.size": 10,
         "text.color": INK,
         "axes.labelcolor": INK,
