@@ -155,7 +155,8 @@ class Store:
         ordered = sorted(self._fresh, key=lambda row: int(row["episode"] or 0))
         with readable_errors(self.folder):
             try:
-                pq.write_table(pa.Table.from_pylist(ordered, self._schema), temporary)
+                with temporary.open("wb") as file:  # Arrow takes no name that is not UTF-8
+                    pq.write_table(pa.Table.from_pylist(ordered, self._schema), file)
                 _sync(temporary)
                 temporary.replace(self.folder / name)
                 _sync(self.folder)
@@ -194,7 +195,7 @@ class Store:
 
 def _read_shard(path: Path, wanted: pa.Schema) -> pa.Table:
     try:
-        with pq.ParquetFile(path) as shard:  # ten times as fast as read_table on a small file
+        with path.open("rb") as file, pq.ParquetFile(file) as shard:  # ten times as fast as read_table on a small file
             table = shard.read()
     except (pa.ArrowException, OSError, ValueError) as error:
         short = str(error).splitlines()[0]

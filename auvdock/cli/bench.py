@@ -15,7 +15,7 @@ import numpy as np
 from rich.table import Table
 
 from auvdock.cli.console import output, track
-from auvdock.cli.parsing import parse
+from auvdock.cli.parsing import at_least, parse
 from auvdock.core.errors import GraphicsError
 from auvdock.envs.docking import DockingEnv
 from auvdock.episode.config import AnyEpisodeCfg, landing_level_cfg, level_cfg
@@ -38,6 +38,7 @@ class Bench:
 def run(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(Bench, argv, prog)
+    at_least(1, episodes=args.episodes)
     _pin_to_one_core()
     steps: list[tuple[str, Callable[[], dict[str, Any]]]] = [
         ("physics", _physics),

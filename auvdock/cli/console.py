@@ -50,8 +50,8 @@ def description() -> TextColumn:
 
 
 def live(console: Console, *columns: ProgressColumn) -> Progress:
-    """A progress bar that goes away at its end."""
-    return Progress(*columns, console=console, transient=True)
+    """A progress bar that goes away at its end; none where the console is no terminal."""
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
 
 def counting_progress() -> Progress:

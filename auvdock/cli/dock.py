@@ -19,7 +19,8 @@ __all__ = ["DockConical", "run_conical"]
 class DockConical(DockFlags):
     """Dock into the conical station: one episode.
 
-    Exit code: 0 docked, 1 not docked, 2 input that cannot be used.
+    Exit code: 0 docked, 1 not docked, 2 input that cannot be used, 70 unexpected error, 74 docked and 75 not docked but
+    the recording or the output could not be written.
     """
 
     episode: Annotated[EpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=EpisodeCfg)

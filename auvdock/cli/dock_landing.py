@@ -19,7 +19,8 @@ __all__ = ["DockLanding", "run_landing"]
 class DockLanding(DockFlags):
     """Land on the platform by its lights and its AprilTag: one episode that begins some metres above it.
 
-    Exit code: 0 docked, 1 not docked, 2 input that cannot be used.
+    Exit code: 0 docked, 1 not docked, 2 input that cannot be used, 70 unexpected error, 74 docked and 75 not docked but
+    the recording or the output could not be written.
     """
 
     vehicle: str | None = None

@@ -26,7 +26,8 @@ def _base() -> EpisodeCfg:
 class DockRotating(DockConical):
     """Dock by the rotating beacon: one episode that begins anywhere in a ring around the station, with any heading.
 
-    Exit code: 0 docked, 1 not docked, 2 input that cannot be used.
+    Exit code: 0 docked, 1 not docked, 2 input that cannot be used, 70 unexpected error, 74 docked and 75 not docked but
+    the recording or the output could not be written.
     """
 
     clock_offset: float | None = None

@@ -13,7 +13,7 @@ import numpy as np
 import tyro
 
 from auvdock.cli.console import messages, track
-from auvdock.cli.parsing import parse
+from auvdock.cli.parsing import at_least, parse
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
@@ -50,6 +50,8 @@ class FitDetector:
 def run(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(FitDetector, argv, prog)
+    at_least(1, frames=args.frames)
+    at_least(0, seed=args.seed)
     detector = make_detector(args.detector)
     rng = np.random.default_rng(args.seed)
     observations: list[Observation] = []

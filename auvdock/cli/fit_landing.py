@@ -13,7 +13,7 @@ import tyro
 
 from auvdock.cli.console import messages, track
 from auvdock.cli.fit import CONDITIONS, write_model
-from auvdock.cli.parsing import parse
+from auvdock.cli.parsing import at_least, parse
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
@@ -53,6 +53,8 @@ class FitLanding:
 def run(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(FitLanding, argv, prog)
+    at_least(1, frames=args.frames)
+    at_least(0, seed=args.seed)
     detector = make_detector(args.detector)
     tag_detector = make_tag_detector(args.tag_detector, (LandingWorldCfg().station.tag.tag_id,))
     rng = np.random.default_rng(args.seed)

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import io
 from collections.abc import Sequence
+from contextlib import redirect_stderr
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -23,12 +25,13 @@ from tyro.constructors import (
 )
 
 from auvdock.campaign.config import STATIONS
+from auvdock.cli.flag_errors import FlagError, one_line
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import names_file, read_toml, recheck
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.optics.water import WaterCfg, load_water
 
-__all__ = ["DEFAULT_LEVEL", "base_config", "level_and_file", "parse", "station_file", "with_station"]
+__all__ = ["DEFAULT_LEVEL", "at_least", "base_config", "level_and_file", "parse", "station_file", "with_station"]
 
 T = TypeVar("T")
 
@@ -37,16 +40,24 @@ DEFAULT_LEVEL = 1
 
 
 def parse(cls: type[T], argv: Sequence[str], prog: str, default: T | None = None) -> T:
-    """Fill the dataclass `cls` from flags; wrong flags end the program with exit code 2, as argparse's do.
+    """Fill the dataclass `cls` from flags; asked for help it prints that and ends the program.
 
     Raises:
+        FlagError: flags that cannot be used.
         ConfigError: a value that its field's dataclass refuses, or that is no finite number.
     """
     doc = (cls.__doc__ or "").strip()
     # What a configuration may leave out (a rotating beacon) shall give flags where it is there, never subcommands.
     config = (tyro.conf.AvoidSubcommands,)
     read = partial(tyro.cli, cls, args=list(argv), prog=prog, description=doc, config=config, registry=_registry())
-    given: T = read() if default is None else read(default=default)
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said):
+            given: T = read() if default is None else read(default=default)
+    except SystemExit as stop:
+        if stop.code:
+            raise FlagError(one_line(said.getvalue(), prog)) from None
+        raise
     try:
         return recheck(given)
     except ConfigError as error:
@@ -96,6 +107,17 @@ def _unchecked(cls: type, **values: Any) -> object:  # noqa: ANN401 - whatever f
     for name, value in values.items():
         object.__setattr__(made, name, value)
     return made
+
+
+def at_least(least: int, **values: int | None) -> None:
+    """Refuse whole numbers below `least`, by the names of their flags; None is a flag that was not given.
+
+    Raises:
+        ConfigError: the first that is too small.
+    """
+    for name, value in values.items():
+        if value is not None and value < least:
+            raise ConfigError(name.replace("_", "-"), value, f"a whole number of {least} or more")
 
 
 def base_config(argv: Sequence[str], station: str) -> AnyEpisodeCfg:

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from auvdock.cli import exit_codes
 from auvdock.cli.console import command_line, counting_progress, output
-from auvdock.cli.parsing import parse
+from auvdock.cli.parsing import at_least, parse
 from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.core.station import load_conical_station
@@ -63,10 +63,7 @@ class GuidanceDesign:
 def run_guidance_design(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(GuidanceDesign, argv, prog)
-    if args.episodes < 0:
-        raise ConfigError("episodes", args.episodes, "0 or more")
-    if args.seed < 0:
-        raise ConfigError("seed", args.seed, "a whole number of 0 or more")
+    at_least(0, episodes=args.episodes, seed=args.seed)
     if args.workers is not None and args.workers < 1:
         raise ConfigError("workers", args.workers, "1 or more")
     load_water(args.water)

@@ -57,9 +57,9 @@ def run(argv: Sequence[str], prog: str) -> int:
     _record(campaign, args.record_failures, saving)
     page = args.folder / "report.html"
     try:
-        page.write_text(html_page(campaign, comparison), encoding="utf-8")
-        page.with_suffix(".csv").write_text(csv_table(campaign), encoding="utf-8")
-        page.with_suffix(".tex").write_text(latex_table(campaign), encoding="utf-8")
+        tables = {page: html_page(campaign, comparison), page.with_suffix(".csv"): csv_table(campaign)}
+        for path, text in {**tables, page.with_suffix(".tex"): latex_table(campaign)}.items():
+            path.write_text(text, encoding="utf-8", errors="backslashreplace")  # a folder's name may be no text
     except OSError as error:
         raise CampaignError(f"{args.folder}: cannot be written ({error.strerror})") from error
     if args.json:

@@ -14,9 +14,8 @@ from rich.table import Table
 from auvdock.campaign.statistics import McNemar, Rate
 from auvdock.cli import exit_codes
 from auvdock.cli.console import counting_progress, output
-from auvdock.cli.parsing import parse
+from auvdock.cli.parsing import at_least, parse
 from auvdock.cli.saving import Saving
-from auvdock.core.errors import ConfigError
 from auvdock.experiments.kept import Kept
 from auvdock.experiments.rotating_docking import (
     ARMS,
@@ -63,10 +62,8 @@ class RotatingDocking:
 def run_rotating_docking(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(RotatingDocking, argv, prog)
-    if args.episodes < 1:
-        raise ConfigError("episodes", args.episodes, "1 or more")
-    if args.workers < 1:
-        raise ConfigError("workers", args.workers, "1 or more")
+    at_least(1, episodes=args.episodes, workers=args.workers)
+    at_least(0, first_seed=args.first_seed)
     arms = pick_arms(args.arms)
     if args.out is not None:
         make_folder(args.out)

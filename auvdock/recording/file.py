@@ -2,7 +2,8 @@
 
 Rerun's own file sink writes from a thread of its own. If that fails, it says so on standard error, ends, and from then
 on every flush waits for ever. So Rerun writes into a pipe, and a thread here moves the bytes from there to the file: an
-error is kept in `failure`, and what comes after it is thrown away.
+error is kept in `failure`, and what comes after it is thrown away. A file that ends within a message cannot be read, so
+an incomplete one is cut back to where it was last whole.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import atexit
 import os
 import selectors
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 import rerun as rr
@@ -37,9 +39,14 @@ class RecordingFile:
         self._stream = stream
         self._thread: threading.Thread | None = None
         self._ended = threading.Event()
+        self._moving = threading.Lock()
+        self._written = self._whole = 0
+        """Bytes in the file, and how many of them are whole messages for certain."""
         if _PIPES.is_dir():
             self._file = path.open("wb", buffering=0)
             self._pipe, entrance = os.pipe()
+            self._selector = selectors.DefaultSelector()
+            self._selector.register(self._pipe, selectors.EVENT_READ)
             self._thread = threading.Thread(target=self._move, name=f"recording {path.name}", daemon=True)
             self._thread.start()
             stream.save(_PIPES / str(entrance))
@@ -51,8 +58,13 @@ class RecordingFile:
         atexit.register(self._leave)
 
     def flush(self) -> None:
-        """Wait until Rerun has given away all that it was given; a disk that is slow holds the caller up here."""
+        """Wait until all that Rerun was given is in the file; a disk that is slow holds the caller up here."""
         self._stream.flush()
+        if self._thread is not None:
+            with self._moving:
+                self._move_all()
+                if self.failure is None:
+                    self._whole = self._written
 
     def close(self) -> None:
         """Let Rerun write its end, and close the file; `failure` is then final."""
@@ -64,7 +76,11 @@ class RecordingFile:
         self._ended.set()
         self._thread.join()
         self._thread = None
+        self._selector.close()
         os.close(self._pipe)
+        if self.failure is not None:
+            with suppress(OSError):  # no regular file
+                self._file.truncate(self._whole)
         try:
             self._file.close()
         except OSError as error:  # some network file systems tell only now
@@ -80,24 +96,33 @@ class RecordingFile:
 
         A forked child may hold that end as well; then no more bytes after `close` began are the end.
         """
-        with selectors.DefaultSelector() as selector:
-            selector.register(self._pipe, selectors.EVENT_READ)
-            while True:
-                if selector.select(_PATIENCE_S):
-                    data = os.read(self._pipe, _CHUNK)
-                    if not data:
+        while True:
+            if self._selector.select(_PATIENCE_S):
+                with self._moving:
+                    if not self._move_all():
                         return
-                    self._write(data)
-                elif self._ended.is_set():
-                    return
+            elif self._ended.is_set():
+                return
+
+    def _move_all(self) -> bool:
+        """Move what is in the pipe now; False at its end."""
+        while self._selector.select(0.0):
+            data = os.read(self._pipe, _CHUNK)
+            if not data:
+                return False
+            self._write(data)
+        return True
 
     def _write(self, data: bytes) -> None:
         rest = memoryview(data)
         while rest and self.failure is None:
             try:
-                rest = rest[self._file.write(rest) :]
+                count = self._file.write(rest)
             except OSError as error:
                 self._fail(error)
+            else:
+                self._written += count
+                rest = rest[count:]
 
     def _fail(self, error: OSError) -> None:
         self.failure = self.failure or error.strerror or str(error)

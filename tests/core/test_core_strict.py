@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
@@ -100,3 +101,31 @@ def test_numbers_too_long_to_write_and_lists_too_deep_to_read_are_refused(tmp_pa
         (tmp_path / "long.toml").write_text(text, encoding="utf-8")
         with pytest.raises(ConfigError):
             load_toml(Outer, tmp_path / "long.toml")
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"], ids=["none", "byte-order mark"])
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"], ids=["unix", "windows"])
+def test_a_file_of_any_editor_is_read(mark, end, tmp_path):
+    path = tmp_path / "some.toml"
+    path.write_bytes(mark + end.join([b"[world]", "water = 'See \u2713'".encode(), b""]))
+    assert read_toml(path) == {"world": {"water": "See \u2713"}}
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        ("a = 1".encode("utf-16"), "UTF-8"),
+        (b"\xef\xbb\xbf\xef\xbb\xbfa = 1", "valid TOML"),
+        (b"a = " + b"[" * 20000 + b"]" * 20000, "valid TOML"),
+    ],
+)
+def test_a_file_that_cannot_be_read_says_why(content, why, tmp_path):
+    path = tmp_path / "some.toml"
+    path.write_bytes(content)
+    with pytest.raises(ConfigError, match=why):
+        read_toml(path)
+
+
+def test_a_name_that_no_file_can_have():
+    with pytest.raises(ConfigError, match="readable"):
+        read_toml(Path("a\0b.toml"))
