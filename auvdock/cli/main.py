@@ -112,8 +112,11 @@ def _answer(words: list[str]) -> int:
     except KeyboardInterrupt:
         tell("interrupted")
         return exit_codes.INTERRUPTED
-    except SystemExit as stop:  # tyro's, after --help or a flag that it does not understand
-        return exit_codes.DONE if stop.code is None else int(stop.code)
+    except SystemExit as stop:  # tyro's, after --help
+        if stop.code is None or isinstance(stop.code, int):
+            return stop.code or exit_codes.DONE
+        report_crash(stop, words)
+        return exit_codes.FAULT
     except Exception as error:
         report_crash(error, words)
         return exit_codes.FAULT

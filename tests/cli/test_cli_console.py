@@ -6,6 +6,7 @@ import ast
 import io
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -21,7 +22,7 @@ MARKED = st.text(st.sampled_from("ab[]/:#=\\@ ") | st.characters(categories=("L"
 ODD = ("r[/x]", "out[seed]", "[bold]", ":warning:", "a[link=b]c", "\\[x]")
 
 
-def printed(*what: object, width: int = 2000, **how: bool) -> str:
+def printed(*what: object, width: int = 2000, **how: Any) -> str:
     console = output()
     console.file = io.StringIO()
     console.width = width

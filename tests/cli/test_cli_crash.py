@@ -77,6 +77,12 @@ def test_text_that_is_none_does_not_hinder_the_report(temporary, monkeypatch, ca
     assert "udcff" in file.read_text(encoding="utf-8")
 
 
+def test_a_plug_in_that_ends_the_program_with_a_word_gives_no_verdict(temporary, monkeypatch, capsys):
+    break_command(("bench",), SystemExit("good bye"), monkeypatch)
+    assert main(["bench"]) == 70
+    assert "SystemExit: good bye" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt(), 130), (SystemExit(2), 2), (SystemExit(), 0)])
 def test_other_ends_keep_their_codes(error, code, temporary, monkeypatch, capsys):
     break_command(("bench",), error, monkeypatch)
