@@ -11,11 +11,12 @@ from typing import Annotated, Any
 
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvdock.cli import exit_codes
+from auvdock.cli.console import counting_progress, output
 from auvdock.cli.parsing import parse
+from auvdock.cli.saving import Saving
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.experiments.halo_check import (
@@ -93,29 +94,30 @@ def run_halo(argv: Sequence[str], prog: str) -> int:
     folder = args.out if args.make_table is None else args.make_table
     if folder is not None:
         make_folder(folder)
-    columns = (TextColumn("{task.description}"), BarColumn(40), TextColumn("{task.completed}/{task.total}"))
+    saving = Saving()
     checks: list[HaloCheck] = []
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as progress:
+    with counting_progress() as progress:
         for phase in phases:
             task = progress.add_task(f"photons in {phase}", total=BATCHES)
             told = partial(progress.advance, task)
             if args.make_table is not None:
                 grid = make_grid(phase, count_photons(load_phase(phase), args.photons, args.seed, told))
-                save_halo(grid, args.make_table / f"{phase}.npz")
+                saving.attempt(args.make_table / f"{phase}.npz", partial(save_halo, grid))
             else:
                 checks.append(check_halo(phase, args.photons, args.seed, told))
     if args.make_table is not None:
-        sizes = {phase: (args.make_table / f"{phase}.npz").stat().st_size for phase in phases}
+        sizes = {Path(table).stem: Path(table).stat().st_size for table in saving.written}
         _tell(args, {"photons": args.photons, "bytes": sizes}, [f"{p}.npz: {n} bytes" for p, n in sizes.items()])
-        return 0
+        return saving.finish(exit_codes.DONE)
     if args.out is not None:
-        draw_halo(args.out / "halo.png", checks)
+        saving.attempt(args.out / "halo.png", lambda path: draw_halo(path, checks))
     rows = [_verdict(check) for check in checks]
     if args.json:
         print(json.dumps({"target": 0.1, "phases": rows}, allow_nan=False))
     else:
         _print(rows)
-    return 0 if all(row["judged"] and row["greatest_deviation"] <= 0.1 for row in rows) else 1
+    good = all(row["judged"] and row["greatest_deviation"] <= 0.1 for row in rows)
+    return saving.finish(exit_codes.DONE if good else exit_codes.NOT_MET)
 
 
 def _case(args: Halo, name: str) -> int:
@@ -150,7 +152,7 @@ def _case(args: Halo, name: str) -> int:
     if args.json:
         print(json.dumps(plain, allow_nan=False))
         return 0
-    console = Console()
+    console = output()
     console.print(
         f"{name} at {args.range_m:g} m, {args.wavelength_nm:g} nm: a = {case.absorption_per_m:.3g} 1/m, "
         f"b = {case.scattering_per_m:.3g} 1/m, b r = {case.scattering_depth:.3g}, {case.phase}; "
@@ -212,7 +214,7 @@ def _verdict(check: HaloCheck) -> dict[str, Any]:
 
 
 def _print(rows: Sequence[dict[str, Any]]) -> None:
-    console = Console()
+    console = output()
     title = "halo within 0.2° to 40°, b r 0.5 to 20, a/b 0.05 to 1: table over fresh photons"
     table = Table(title=title, title_justify="left")
     columns = ("phase function", "readings", "judged", "within 10 %", "greatest", "rms", "table's error up to")

@@ -13,7 +13,7 @@ import numpy as np
 import rerun as rr
 
 from auvdock.core.arrays import Image
-from auvdock.core.errors import AuvdockError, ConfigError
+from auvdock.core.errors import AuvdockError, AuvdockWarning, ConfigError
 from auvdock.recording import paths
 from auvdock.recording.columns import ColumnWriter, Row
 from auvdock.recording.file import RecordingFile
@@ -31,7 +31,7 @@ _BATCH_ROWS = 256
 _BATCH_WALL_S = 0.5
 
 
-class RecordingWarning(UserWarning):
+class RecordingWarning(AuvdockWarning):
     """A recording is incomplete, its file could not be written any further."""
 
 

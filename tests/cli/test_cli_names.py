@@ -79,7 +79,7 @@ def test_a_plan(folder, capsysbinary):
         *([command, NAME] for command in ("dock", "reproduce", "report", "view", "plan", "doctor", "bench")),
         ["fit-detector", NAME, "--out", "model.toml"],
         ["fit-landing", "cores", NAME, "--out-lights", "lights.toml", "--out-tags", "tags.toml"],
-        *(["sweep", "--out", "nowhere", flag, NAME] for flag in ("--campaign", "--axis", "--water", "--executor")),
+        *(["sweep", "--out", "nowhere", flag, NAME] for flag in ("--campaign", "--axis", "--executor")),
         ["reproduce", "guidance-region", "--waters", NAME, "--steps", "2"],
         ["reproduce", "guidance-design", "--water", NAME],
         ["reproduce", "landing-trials", "--levels", NAME],
