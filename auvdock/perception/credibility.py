@@ -6,7 +6,8 @@ at any range, and among a dozen spurious lights some four lie like four of six b
 1. its fit: χ² of reprojection and attitude prior at the solution, against its distribution for n lights;
 2. its range: the standard deviation along the line of sight, σ_r, must be a small share of the range, and no lamp is
    seen farther away than its light reaches;
-3. chance: identities that are handed out anew must be far likelier than spurious lights in those places. That is the
+3. its step from the last pose: no farther than the vehicle can go and the poses' own uncertainty explains;
+4. chance: identities that are handed out anew must be far likelier than spurious lights in those places. That is the
    score of multiple-hypothesis tracking (Reid 1979; Blackman & Popoli 1999, section 6.2), with the pose, which nobody
    knows beforehand, integrated out by Laplace's approximation.
 """
@@ -32,14 +33,16 @@ __all__ = ["Credibility", "CredibilityCfg"]
 class CredibilityCfg:
     """When a solved pose is believed."""
 
-    fit_probability: float = 0.01
-    """A right pose has a worse χ² with this probability; one that fits worse is not believed."""
+    fit_probability: float = 0.003
+    """A right pose fits worse, or steps farther, with this probability each; one that does is not believed."""
     max_range_sigma: float = 0.1
     """Greatest σ_r over the range ..."""
     max_range_sigma_m: float = 0.3
     """... and σ_r that is always good enough."""
     max_range_m: float = 60.0
     """Lamps are seen no farther than this in any water (paper B saw a 30 W beacon at 50 m)."""
+    max_speed_m_s: float = 3.0
+    """The vehicle is never faster over ground."""
     detection_probability: float = 0.9
     """Share of the beacons in view that a detector finds, for the odds of a new identification."""
     min_log_odds: float = 10.0
@@ -50,7 +53,7 @@ class CredibilityCfg:
         for name in ("fit_probability", "detection_probability"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ConfigError(name, getattr(self, name), "a probability above 0 and below 1")
-        for name in ("max_range_sigma", "max_range_sigma_m", "max_range_m"):
+        for name in ("max_range_sigma", "max_range_sigma_m", "max_range_m", "max_speed_m_s"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(name, getattr(self, name), "a value above 0")
 
@@ -74,6 +77,7 @@ class Credibility:
         known = 3 if attitude_sigma_rad > 0.0 else 0
         freedom = 2.0 * np.arange(len(blue_m) + 1) + known - 6.0
         self._worst_fit = [float(chdtri(f, cfg.fit_probability)) if f > 0 else math.inf for f in freedom]
+        self._worst_step = float(chdtri(3.0, cfg.fit_probability))
         corner = camera.normalise(np.array([[-0.5, -0.5], [camera.width_px - 0.5, camera.height_px - 0.5]]))
         width, height = (corner[1] - corner[0]).tolist()
         # The camera may be anywhere from where the array lies within its field of view and its light's reach.
@@ -89,6 +93,31 @@ class Credibility:
             return False
         variance = float(position @ solution.covariance()[:3, :3] @ position) / range_m**2
         return variance <= max(cfg.max_range_sigma_m, cfg.max_range_sigma * range_m) ** 2
+
+    def follows(self, solution: PnpSolution, before: PnpSolution, elapsed_s: float) -> bool:
+        """Whether the vehicle can have come here from an earlier pose.
+
+        What the step is longer than the way that it can go must be explained by the noise of both poses' lights. The
+        attitude prior's error, which makes most of a distant pose's σ, is common to both and moves neither from the
+        other: with the prior's weight P⁻¹, light alone makes Σ - Σ P⁻¹ Σ of a pose's covariance Σ.
+        """
+        step = solution.T_station_camera()[:3, 3] - before.T_station_camera()[:3, 3]
+        length_m = math.sqrt(float(step @ step))
+        excess_m = length_m - self._cfg.max_speed_m_s * elapsed_s
+        if excess_m <= 0.0:
+            return True
+        along = step / length_m
+        variance = self._noise_along(solution, along) + self._noise_along(before, along)
+        return excess_m**2 <= self._worst_step * variance
+
+    def _noise_along(self, solution: PnpSolution, along: Array) -> float:
+        """Variance of the position along a direction (3,) that the noise of the lights makes, m²."""
+        covariance = solution.covariance()
+        variance = float(along @ covariance[:3, :3] @ along)
+        if self._attitude_sigma_rad > 0.0:
+            by_attitude = along @ covariance[:3, 3:]
+            variance -= float(by_attitude @ by_attitude) / self._attitude_sigma_rad**2
+        return max(variance, 0.0)
 
     def log_odds(
         self,

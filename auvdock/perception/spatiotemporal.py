@@ -54,6 +54,7 @@ class SpatiotemporalAssociation:
         self._sigma_px = pixel_sigma_px
         self._camera = camera
         self._array_m = np.ascontiguousarray(layout.array_positions_m)
+        self._rate_hz = camera.rate_hz
         self._size_px = (camera.width_px, camera.height_px)
         self._focal_px = float(camera.matrix[0, 0])
         radius = np.linalg.norm(self._array_m - self._array_m.mean(axis=0), axis=1)
@@ -70,6 +71,7 @@ class SpatiotemporalAssociation:
     def reset(self) -> None:
         """Forget the last pose."""
         self._last: PnpSolution | None = None
+        self._believed: PnpSolution | None = None
         self._age = 0
 
     def update(
@@ -83,14 +85,15 @@ class SpatiotemporalAssociation:
         self._solver.heading_sigma_rad = heading_sigma_rad
         self._age += 1
         if self._age > _MAX_POSE_AGE:
-            self._last = None
+            self._last = self._believed = None
         result = self._solve_labelled(tracks, detections, rotation_prior)
         if result is None and self._authenticate(tracks, rotation_prior):
             result = self._solve_labelled(tracks, detections, rotation_prior)
         if result is None:
             return Associated()
         if result.solution is not None and result.array_count >= _MIN_LIT:
-            self._last, self._age = result.solution, 0
+            self._last = self._believed = result.solution
+            self._age = 0
             if result.array_count < len(self._array_m):
                 self._reacquire(tracks, result.solution)
         return result
@@ -129,7 +132,14 @@ class SpatiotemporalAssociation:
         solution = self._solver.solve_lights(lights, prior, self._last)
         if solution is None or (seen and solution.error_px > self._pnp.max_reprojection_px):
             return None
-        return solution if self._credibility.holds(solution) else None
+        return solution if self._is_believed(solution) else None
+
+    def _is_believed(self, solution: PnpSolution) -> bool:
+        """Whether a pose can be right, by itself and after the last one that was."""
+        if not self._credibility.holds(solution):
+            return False
+        before = self._believed
+        return before is None or self._credibility.follows(solution, before, self._age / self._rate_hz)
 
     def _without_worst(
         self, tracks: LightTracker, lights: Array, owners: IntArray, prior: Array
@@ -161,7 +171,6 @@ class SpatiotemporalAssociation:
             settled = self._settle(pixels, identity, prior, others)
             if settled is not None:
                 identity, self._last = settled
-                self._age = 0
                 found = np.flatnonzero(identity >= 0)
                 tracks.beacon_id[:] = -1
                 tracks.beacon_id[chosen[identity[found]]] = found
@@ -195,7 +204,7 @@ class SpatiotemporalAssociation:
 
     def _likely(self, solution: PnpSolution, identity: IntArray, pixels: Array, others_px: Array) -> bool:
         """Whether new identities hold: a good fit, and far likelier than spurious lights in those places."""
-        if solution.error_px > self._pnp.max_reprojection_px or not self._credibility.holds(solution):
+        if solution.error_px > self._pnp.max_reprojection_px or not self._is_believed(solution):
             return False
         unused = np.setdiff1d(np.arange(len(self._blue_m)), np.flatnonzero(identity >= 0))
         others_px = np.vstack([np.delete(pixels, identity[identity >= 0], axis=0), others_px])
