@@ -36,7 +36,7 @@ class RewardCfg:
         """All are finite; a cost below 0 would be a prize."""
         for name, value in vars(self).items():
             if not (math.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"reward.{name}", value, "0 or more")
+                raise ConfigError(name, value, "0 or more")
 
     def of(self, progress_m: float, work_j: float, period_s: float, *, success: bool, end: str | None) -> float:
         """Reward of one control period.

@@ -54,5 +54,5 @@ def test_saturated_loop_leaves_saturation_at_once():
 
 
 def test_negative_gain_is_refused():
-    with pytest.raises(ConfigError, match=r"pid\.ki"):
+    with pytest.raises(ConfigError, match=r"^ki: "):
         PidGains(1.0, -1.0)

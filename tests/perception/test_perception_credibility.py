@@ -21,7 +21,7 @@ from perception_scenes import (
     random_motion,
 )
 
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, IntArray
 from auvdock.core.contracts import BLUE, Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
@@ -47,7 +47,7 @@ def turned(rng: np.random.Generator, sigma_rad: float) -> Array:
     return rotation_from_euler_zyx(*rng.normal(0.0, sigma_rad, 3).tolist())
 
 
-def solved(T_station_camera: Array, prior: Array, noise_px: Array, beacons: Array) -> PnpSolution:
+def solved(T_station_camera: Array, prior: Array, noise_px: Array, beacons: IntArray) -> PnpSolution:
     pixels = pixels_of(T_station_camera, RING[beacons]) + noise_px
     solution = PnpSolver(PnpCfg(), CAMERA).solve(RING[beacons], pixels, np.full(len(beacons), SIGMA_PX), prior)
     assert solution is not None
@@ -142,8 +142,8 @@ def test_odds_fall_with_a_crowd_and_rise_with_every_beacon_that_is_where_it_must
 def test_a_step_is_believed_as_far_as_speed_and_noise_reach():
     """Two poses of one frame's distance, each with noise of its own, share the prior's error of 5°, as in a flight.
 
-    At most as many are refused as is stated, 2 % (within 3.3 standard deviations of 500 draws); fewer, since the vehicle's
-    own way is taken off. A vehicle at 2 m/s without noise is never refused, a step of 3 m always.
+    At most as many are refused as is stated, 2 % (within 3.3 standard deviations of 500 draws); fewer, since the
+    vehicle's own way is taken off. A vehicle at 2 m/s without noise is never refused, a step of 3 m always.
     """
     rng = np.random.default_rng(4)
     credibility = Credibility(CredibilityCfg(fit_probability=0.02), CAMERA, BLUE_LAMPS, PRIOR_RAD)

@@ -17,6 +17,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.contracts import BLUE, Detections, Frame, TagDetection
 from auvdock.core.linear import solve_positive
 from auvdock.core.transforms import invert, make_transform
+from auvdock.perception.credibility import CredibilityCfg
 from auvdock.perception.hungarian_ransac import HungarianRansacAssociation, HungarianRansacCfg
 from auvdock.perception.landing.config import AttitudeCfg, LightLevelCfg, TagLevelCfg
 from auvdock.perception.landing.level import LevelPose, LevelSolver
@@ -151,7 +152,7 @@ def test_hungarian_ransac(seed: int, spoil: Spoiler, n: int):
     rng = np.random.default_rng(seed)
     T = random_motion(rng, POINTS).at(0.0)[0]
     assert all_in_view(T, POINTS)
-    association = HungarianRansacAssociation(HungarianRansacCfg(), PnpCfg(), SIGMA_PX, CAMERA, LAYOUT)
+    association = HungarianRansacAssociation(HungarianRansacCfg(), PnpCfg(), CredibilityCfg(), SIGMA_PX, CAMERA, LAYOUT)
     tracks = LightTracker(TrackerCfg(), 30.0, 640, 360)
     pixels = pixels_of(T, POINTS)
     for centres in (pixels, spoil(pixels[:n], rng) if n > 0 else pixels[:0]):

@@ -129,5 +129,5 @@ def test_refuses_searches_without_sense(settings, words):
 
 @pytest.mark.parametrize("settings", [{"lights": 3}, {"min_radius_m": 0.0}, {"min_beam_deg": 80.0}, {"min_gap_m": 5.0}])
 def test_refuses_bounds_without_a_layout(settings):
-    with pytest.raises(ConfigError, match="bounds"):
+    with pytest.raises(ConfigError, match=f"^{next(iter(settings))}: "):
         ArrayBounds(**settings)
