@@ -75,8 +75,8 @@ class Credibility:
         self._blue_m = blue_m
         self._attitude_sigma_rad = attitude_sigma_rad
         known = 3 if attitude_sigma_rad > 0.0 else 0
-        freedom = 2.0 * np.arange(len(blue_m) + 1) + known - 6.0
-        self._worst_fit = [float(chdtri(f, cfg.fit_probability)) if f > 0 else math.inf for f in freedom]
+        self._freedom = [2.0 * lights + known - 6.0 for lights in range(len(blue_m) + 1)]
+        self._worst_fit = [float(chdtri(f, cfg.fit_probability)) if f > 0 else math.inf for f in self._freedom]
         self._worst_step = float(chdtri(3.0, cfg.fit_probability))
         corner = camera.normalise(np.array([[-0.5, -0.5], [camera.width_px - 0.5, camera.height_px - 0.5]]))
         width, height = (corner[1] - corner[0]).tolist()
@@ -93,6 +93,10 @@ class Credibility:
             return False
         variance = float(position @ solution.covariance()[:3, :3] @ position) / range_m**2
         return variance <= max(cfg.max_range_sigma_m, cfg.max_range_sigma * range_m) ** 2
+
+    def expected_cost(self, lights: int) -> float:
+        """Mean of χ² at the pose of so many lights: their coordinates and the prior's, less the pose's six."""
+        return self._freedom[lights]
 
     def follows(self, solution: PnpSolution, before: PnpSolution, elapsed_s: float) -> bool:
         """Whether the vehicle can have come here from an earlier pose.

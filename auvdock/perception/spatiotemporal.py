@@ -15,6 +15,7 @@ from auvdock.perception.authentication import AuthenticationCfg, Authenticator
 from auvdock.perception.credibility import Credibility, CredibilityCfg
 from auvdock.perception.labelled import labelled_lights
 from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
+from auvdock.perception.pnp_refine import SEEN
 from auvdock.perception.tracker import LightTracker
 
 __all__ = ["SpatiotemporalAssociation"]
@@ -35,8 +36,8 @@ class SpatiotemporalAssociation:
 
     A pose is `measured` when at least three authenticated beacons were detected in this frame. With four or more it
     rests on them alone; with three, the predicted positions of the others support it (weighted by their tracks'
-    variance), or the last pose where no track is left to predict. With fewer it is solved from four or more detected
-    or predicted positions and is not `measured`; below that there is no pose.
+    variance) where they agree with what is seen, or the last pose where no track is left to predict. With fewer it is
+    solved from four or more detected or predicted positions and is not `measured`; below that there is no pose.
     """
 
     def __init__(
@@ -118,6 +119,11 @@ class SpatiotemporalAssociation:
                 tracks.beacon_id[:] = -1
             return None
         solution = self._verified(lights, seen, prior)
+        if seen == _MIN_LIT < count and (solution is None or solution.cost > self._credibility.expected_cost(count)):
+            there = lights[:, SEEN] > 0.0
+            alone = self._verified(lights[there], seen, prior)
+            if alone is not None:
+                solution, owners = alone, owners[there]
         if solution is None and seen >= 5:
             solution, owners = self._without_worst(tracks, lights, owners, prior)
             seen = len(owners)

@@ -47,8 +47,11 @@ def approach(distance_m: float = 6.0) -> Motion:
 class Run:
     """An approach shown to a perception frame by frame."""
 
-    def __init__(self, seed: int, cfg: PerceptionCfg | None = None, motion: Motion | None = None) -> None:
+    def __init__(
+        self, seed: int, cfg: PerceptionCfg | None = None, motion: Motion | None = None, sigma_px: float = 0.5
+    ) -> None:
         self.rng = np.random.default_rng(seed)
+        self.sigma_px = sigma_px
         self.perception = perception(cfg)
         self.motion = motion or approach()
         self.frame = 0
@@ -64,7 +67,7 @@ class Run:
         centres = pixels_of(self.truth, RING[visible]) if visible else np.zeros((0, 2))
         if extra is not None:
             centres = np.vstack([centres, extra.reshape(-1, 2)])
-        self.detections, order = blue_detections(self.rng, centres)
+        self.detections, order = blue_detections(self.rng, centres, self.sigma_px)
         self.beacons = [visible[row] if row < len(visible) else -1 for row in order.tolist()]
         return self.perception.update(self.detections, proprioception(self.rng, euler, time_s))
 
@@ -258,6 +261,24 @@ def test_comparison_rejects_a_stray_by_ransac():
     assert percept.pose is not None
     assert sorted(percept.pose.beacon_ids) == [0, 1, 2, 3, 5]
     assert position_error_m(percept, run.truth) < 0.6
+
+
+def test_predicted_places_that_disagree_with_what_is_seen_are_left_out():
+    """Strays draw three beacons' tracks 4 px aside in one frame, then only the other three beacons are seen.
+
+    Twelve approaches at 6 m with 0.05 px of noise: in most the pose rests on those three and the attitude, less than
+    0.1 m off. With the drawn predictions its median error was 0.4 m.
+    """
+    errors: list[float] = []
+    for seed in range(12):
+        run = Run(seed, sigma_px=0.05)
+        run.repeat(20)
+        beside = np.array([[4.0, 0.0], [0.0, 4.0], [-4.0, 0.0]])
+        run.show(hidden=(3, 4, 5), extra=pixels_of(run.motion.at(run.frame / 30.0)[0], RING[3:]) + beside)
+        percept = run.show(hidden=(3, 4, 5))
+        assert percept.pose is not None
+        errors.append(position_error_m(percept, run.truth))
+    assert np.median(errors) < 0.1, errors
 
 
 def test_comparison_scores_valid_now_or_holds_the_last():
