@@ -7,7 +7,7 @@ SCRIPT = """
 import importlib, os, pkgutil, signal, sys
 import auvdock
 # Other people's packages first: what they need here is their business.
-import control, cv2, dacite, filelock, gymnasium, matplotlib.pyplot, mujoco.egl, numba, onnxruntime, pyarrow.parquet
+import control, cv2, filelock, gymnasium, matplotlib.pyplot, mujoco.egl, numba, onnxruntime, pyarrow.parquet
 import rerun, rich, scipy.optimize, scipy.spatial, tyro
 import multiprocessing.connection, subprocess
 for name in [name for name in sys.modules if name.partition(".")[0] == "auvdock"]:
