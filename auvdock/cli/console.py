@@ -1,6 +1,7 @@
 """All that the command line prints with. Text is shown as it is: a `[` in a folder's name is no markup of Rich's.
 
-No other file of this room may make a console or a progress bar of its own (ruff's banned-api holds it to that).
+No other file of this room may make a console or a progress bar of its own, nor write markup: coloured text is a
+`rich.text.Text`. `tests/cli/test_cli_console.py` holds them to that.
 """
 
 from __future__ import annotations

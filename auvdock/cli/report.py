@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
+from rich.text import Text
 
 from auvdock.campaign.errors import CampaignError
 from auvdock.campaign.plan import Plan
@@ -72,7 +73,7 @@ def run(argv: Sequence[str], prog: str) -> int:
         shares = f"{100 * (rate.rate or 0.0):.1f} % [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
         console.print(f"success {shares} in {rate.episodes} episodes", highlight=False)
         if rate.lost:
-            console.print(f"[red]{rate.lost} MORE WITHOUT RESULT: crashed or hung, in no rate[/red]", highlight=False)
+            console.print(Text(f"{rate.lost} MORE WITHOUT RESULT: crashed or hung, in no rate", "red"))
         if comparison:
             test = comparison.test
             points = f"{100 * test.difference:+.1f} points, p = {test.p_value:.3g}"

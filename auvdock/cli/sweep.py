@@ -14,8 +14,9 @@ from typing import Annotated, Any, Literal
 
 import tyro
 from rich.table import Table
+from rich.text import Text
 
-from auvdock.campaign.axes import AxisCfg, axis_kind
+from auvdock.campaign.axes import AxisCfg, axis_kind, joined
 from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.campaign import CampaignSummary, run_campaign
 from auvdock.campaign.config import STATIONS, CampaignCfg
@@ -253,7 +254,7 @@ def _resolve(args: SweepFlags, episode: AnyEpisodeCfg, station: str) -> Campaign
         return keep_files(CampaignCfg(**plain, axes=tuple(axes), episode=changes))
     there = load_campaign(args.campaign)
     kept = [axis for axis in there.axes if axis.name not in {axis.name for axis in axes}]
-    wanted = dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=_deep({**there.episode}, changes))
+    wanted = dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=joined((there.episode, changes)))
     return keep_files(wanted)
 
 
@@ -274,13 +275,6 @@ def _difference(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]
         elif value != old:
             changes[name] = value
     return changes
-
-
-def _deep(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    for name, value in other.items():
-        both = isinstance(value, dict) and isinstance(one.get(name), dict)
-        one[name] = _deep({**one[name]}, value) if both else value
-    return one
 
 
 def _executor(args: SweepFlags, cfg: CampaignCfg) -> Executor:
@@ -319,7 +313,7 @@ def print_summary(summary: CampaignSummary, out: Path) -> None:
     for cause, count in summary.failures.items():
         table.add_row(f"failed: {cause}", str(count))
     for cause, count in summary.lost.items():
-        table.add_row(f"[red]NO RESULT: {cause} (in no rate)[/red]", f"[red]{count}[/red]")
+        table.add_row(Text(f"NO RESULT: {cause} (in no rate)", "red"), Text(str(count), "red"))
     table.add_row("run now", str(summary.ran))
     table.add_row("wall-clock time", f"{summary.wall_s:.0f} s")
     table.add_row("peak memory", f"{summary.peak_rss_mb:.0f} MiB")

@@ -192,7 +192,8 @@ def test_the_sweep_says_loudly_what_left_no_result(capsys):
     assert "campaign of 6 episodes" in told
     assert "success rate of 4 with a result" in told
     assert "75.0 %" in told
-    assert "NO RESULT: crashed" in told
+    assert "NO RESULT: crashed (in no rate)" in told
+    assert "[" not in told
     plain = plain_summary(summary)
     assert (plain["success_rate"], plain["episodes"], plain["lost"]) == (0.75, 4, {"crashed": 2})
     assert plain["failures"] == {"near": 1}

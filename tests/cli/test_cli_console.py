@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import io
+import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -71,14 +73,27 @@ def test_an_error_of_several_lines_is_told_in_one(capsys):
     assert capsys.readouterr().err == "auvdock: one two three\n"
 
 
-def test_no_other_file_makes_a_console_of_its_own():
+def other_files() -> Iterator[tuple[str, ast.AST]]:
+    """Every node of the room's other files, with its place."""
     folder = Path(auvdock.cli.__file__).parent
-    found: list[str] = []
     for path in sorted(set(folder.glob("*.py")) - {folder / "console.py"}):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            name = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
-            if name in ("Console", "Progress", "TextColumn"):
-                found.append(f"{path.name}: {name}")
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rich"):
-                found += [f"{path.name}: {alias.name}" for alias in node.names if alias.name in ("track", "print")]
+            yield path.name, node
+
+
+def test_no_text_is_written_as_markup():
+    """It would be printed as it is: `[red]5 lost[/red]`."""
+    texts = [(name, node.value) for name, node in other_files() if isinstance(node, ast.Constant)]
+    assert len(texts) > 1000
+    assert [text for text in texts if isinstance(text[1], str) and re.search(r"\[/[a-z ]*\]", text[1])] == []
+
+
+def test_no_other_file_makes_a_console_of_its_own():
+    found: list[str] = []
+    for file, node in other_files():
+        name = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+        if name in ("Console", "Progress", "TextColumn"):
+            found.append(f"{file}: {name}")
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rich"):
+            found += [f"{file}: {alias.name}" for alias in node.names if alias.name in ("track", "print")]
     assert found == []
