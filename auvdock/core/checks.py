@@ -19,13 +19,13 @@ def check_range(field: str, value: float, low: float, high: float, remedy: str) 
         raise ConfigError(field, value, remedy)
 
 
-def check_above(field: str, value: float, low: float, remedy: str) -> None:
-    """Refuse a number that is not greater than `low`.
+def check_above(field: str, value: float, low: float, remedy: str, high: float = math.inf) -> None:
+    """Refuse a number that is not greater than `low`, or greater than `high`.
 
     Raises:
-        ConfigError: it is not, or is not finite.
+        ConfigError: it lies outside (low, high], or is not finite.
     """
-    if not (math.isfinite(value) and value > low):
+    if not (math.isfinite(value) and low < value <= high):
         raise ConfigError(field, value, remedy)
 
 

@@ -109,8 +109,7 @@ class LandingLatchCfg:
         for name in ("along_m", "across_m", "height_m"):
             check_above(name, getattr(self, name), 0.0, "a length above 0 m")
         for name in ("max_heading_deg", "max_tilt_deg"):
-            check_above(name, getattr(self, name), 0.0, "an angle above 0 and up to 90 degrees")
-            check_range(name, getattr(self, name), 0.0, 90.0, "an angle above 0 and up to 90 degrees")
+            check_above(name, getattr(self, name), 0.0, "an angle above 0 and up to 90 degrees", 90.0)
         for name in ("max_speed_m_s", "max_touchdown_m_s"):
             check_above(name, getattr(self, name), 0.0, "a speed above 0 m/s")
         check_range("hold_s", self.hold_s, 0.0, math.inf, "a time of 0 s or more")

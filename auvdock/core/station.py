@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from auvdock.assets import asset
 from auvdock.core.beacons import BeaconCfg, BeaconLayout, ring_layout
 from auvdock.core.checks import check_above, check_range
-from auvdock.core.errors import ConfigError, located
+from auvdock.core.errors import ConfigError
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.strict import load_toml
 
@@ -33,7 +33,7 @@ class FunnelCfg:
     def __post_init__(self) -> None:
         """Refuse what is not a funnel."""
         for name in ("mouth_radius_m", "length_m", "tube_radius_m", "tube_length_m"):
-            check_above(f"{name}", getattr(self, name), 0.0, "a length above 0 m")
+            check_above(name, getattr(self, name), 0.0, "a length above 0 m")
         if self.tube_radius_m >= self.mouth_radius_m:
             raise ConfigError("tube_radius_m", self.tube_radius_m, "less than mouth_radius_m")
         check_range("friction", self.friction, 0.0, math.inf, "0 or more")
@@ -58,8 +58,7 @@ class LatchCfg:
     def __post_init__(self) -> None:
         """Refuse a latch that never closes or has held before it has closed."""
         check_range("depth_m", self.depth_m, 0.0, math.inf, "a depth of 0 m or more")
-        check_above("max_angle_deg", self.max_angle_deg, 0.0, "an angle above 0 and up to 90 degrees")
-        check_range("max_angle_deg", self.max_angle_deg, 0.0, 90.0, "an angle above 0 and up to 90 degrees")
+        check_above("max_angle_deg", self.max_angle_deg, 0.0, "an angle above 0 and up to 90 degrees", 90.0)
         for name in ("max_speed_m_s", "max_entry_speed_m_s"):
             check_above(name, getattr(self, name), 0.0, "a speed above 0 m/s")
         check_range("hold_s", self.hold_s, 0.0, math.inf, "a time of 0 s or more")
@@ -113,18 +112,13 @@ class ConicalStationCfg:
 
 def conical_layout(cfg: ConicalStationCfg) -> BeaconLayout:
     """The lights of a conical station: `array_count` on the mouth's rim, then those listed."""
-    with located("array_"):  # a lamp's `power_w` is the station's `array_power_w`
-        ring = (
-            ring_layout(
-                cfg.array_count,
-                cfg.funnel.mouth_radius_m,
-                inward_tilt_deg=cfg.array_tilt_deg,
-                beam_angle_deg=cfg.array_beam_angle_deg,
-                power_w=cfg.array_power_w,
-            )
-            if cfg.array_count > 0
-            else ()
-        )
+    ring = ring_layout(
+        cfg.array_count,
+        cfg.funnel.mouth_radius_m,
+        inward_tilt_deg=cfg.array_tilt_deg,
+        beam_angle_deg=cfg.array_beam_angle_deg,
+        power_w=cfg.array_power_w,
+    )
     return BeaconLayout(ring + cfg.beacons)
 
 
