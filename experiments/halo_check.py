@@ -22,7 +22,7 @@ __all__ = ["CHECKED_A_B", "CHECKED_BR", "HALF_ANGLES_DEG", "PHASES", "HaloCase",
 PHASES = ("fournier-forand-0.018", "petzold-coastal", "petzold-harbour")
 """Phase functions of the check."""
 CHECKED_BR = (0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0)
-"""b r of the check; all but by chance between the table's."""
+"""b r of the check; none is one of the table's own, so that reading between those is checked too."""
 CHECKED_A_B = (0.05, 0.1, 0.2, 0.5, 1.0)
 """a / b of the check."""
 HALF_ANGLES_DEG = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0)

@@ -31,14 +31,14 @@ __all__ = ["Credibility", "CredibilityCfg"]
 
 @dataclass(frozen=True)
 class CredibilityCfg:
-    """When a solved pose is believed."""
+    """When a solved pose is believed; all thresholds are ours."""
 
     fit_probability: float = 0.003
     """A right pose fits worse, or steps farther, with this probability each; one that does is not believed."""
     max_range_sigma: float = 0.1
     """Greatest σ_r over the range ..."""
     max_range_sigma_m: float = 0.3
-    """... and σ_r that is always good enough."""
+    """... and σ_r that is always good enough: both are the error from which on an episode counts a pose as false."""
     max_range_m: float = 60.0
     """Lamps are seen no farther than this in any water (paper B saw a 30 W beacon at 50 m)."""
     max_speed_m_s: float = 3.0

@@ -126,7 +126,7 @@ class HungarianRansacAssociation:
         if len(self._ids) == 0 or len(blue) == 0:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
         gap = np.linalg.norm(self._pixels[:, None] - detections.centre_px[blue][None], axis=2)
-        rows, columns = linear_sum_assignment(np.fmin(gap, 2.0 * self._cfg.gate_px))  # also of what is no number
+        rows, columns = linear_sum_assignment(np.fmin(gap, 2.0 * self._cfg.gate_px))  # NaN is beyond the gate
         near = gap[rows, columns] <= self._cfg.gate_px
         return self._ids[rows[near]], blue[columns[near]]
 

@@ -55,7 +55,7 @@ class LightLevelCfg:
     """Consecutive frames that must agree, the vehicle's motion taken out, before a first pose is believed."""
     min_odds: float = 1000.0
     """A pose that lights alone begin must be so many times more likely than strays in their places (`evidence`): strays
-    alone reach that in no more than one of so many frames."""
+    alone reach that in no more than one of so many frames. Ours."""
     gate_px: float = 25.0
     """Farthest that a light may be from where the filter expects it."""
 

@@ -176,7 +176,7 @@ class LightLevel:
             limit = self._cfg.max_reprojection_px * float(np.maximum(sigma, 1.0).mean())
             if pose.estimate.reprojection_error_px <= limit:
                 spots_n = int((detections.class_id == BLUE).sum())
-                if start[1] != "tracked":
+                if start[1] != "tracked":  # `find` looked at no more than these
                     spots_n = min(spots_n, self._cfg.max_lights_n)
                 return NamedLights(pose, named, self._convinces(pose, sigma, spots_n))
         return None
