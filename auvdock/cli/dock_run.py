@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -15,6 +14,7 @@ from auvdock.cli import exit_codes
 from auvdock.cli.console import tell
 from auvdock.cli.display import ProgressDisplay, print_result
 from auvdock.cli.dock_flags import DockFlags
+from auvdock.cli.early_flags import find_flags
 from auvdock.cli.parsing import base_config, parse, station_file, with_station
 from auvdock.cli.recorded import run_recorded
 from auvdock.cli.saving import Saving
@@ -49,21 +49,14 @@ def run_dock(command: type[DockFlags], argv: Sequence[str], prog: str, station: 
 
 def reference_in(argv: Sequence[str]) -> str | None:
     """What `--from` names, if it is given."""
-    return _found(argv, "from")["from"]
-
-
-def _found(argv: Sequence[str], *flags: str) -> dict[str, str | None]:
-    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
-    for flag in flags:
-        finder.add_argument(f"--{flag}", default=None)
-    return vars(finder.parse_known_args(list(argv))[0])
+    return find_flags(argv, "from")["from"]
 
 
 def _stored(argv: Sequence[str], station: str) -> StoredEpisode | None:
     reference = reference_in(argv)
     if reference is None:
         return None
-    for flag, value in _found(argv, "level", "config").items():
+    for flag, value in find_flags(argv, "level", "config").items():
         if value is not None:
             raise ConfigError(flag, value, "no such flag beside --from, which brings its own settings")
     stored = stored_episode(reference)

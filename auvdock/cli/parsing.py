@@ -6,7 +6,6 @@ fills them unchecked, and `auvdock.core.strict.recheck` makes them anew, with ea
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import io
 from collections.abc import Sequence
@@ -25,6 +24,7 @@ from tyro.constructors import (
 )
 
 from auvdock.campaign.config import STATIONS
+from auvdock.cli.early_flags import find_flags
 from auvdock.cli.flag_errors import FlagError, one_line
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import names_file, read_toml, recheck
@@ -141,22 +141,18 @@ def level_and_file(argv: Sequence[str]) -> tuple[int, Path | None]:
     Raises:
         ConfigError: a level that is no whole number.
     """
-    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
-    finder.add_argument("--level", default=str(DEFAULT_LEVEL))
-    finder.add_argument("--config", default=None)
-    found, _ = finder.parse_known_args(list(argv))
+    found = find_flags(argv, "level", "config")
+    level, file = found["level"], found["config"]
     try:
-        level = int(found.level)
+        number = DEFAULT_LEVEL if level is None else int(level)
     except ValueError as error:
-        raise ConfigError("level", found.level, "a whole number of 0 to 4") from error
-    return level, Path(found.config) if found.config else None
+        raise ConfigError("level", level, "a whole number of 0 to 4") from error
+    return number, Path(file) if file else None
 
 
 def station_file(argv: Sequence[str]) -> str | None:
     """What `--station FILE` says."""
-    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
-    finder.add_argument("--station", default=None)
-    return finder.parse_known_args(list(argv))[0].station
+    return find_flags(argv, "station")["station"]
 
 
 def with_station(cfg: AnyEpisodeCfg, file: str) -> AnyEpisodeCfg:

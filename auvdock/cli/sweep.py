@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
 import sys
@@ -28,6 +27,7 @@ from auvdock.campaign.process import ProcessExecutor, usable_cores
 from auvdock.campaign.provenance import manifest_of
 from auvdock.campaign.store import Store, read_campaign
 from auvdock.cli.console import command_line, messages, output, tell
+from auvdock.cli.early_flags import find_flags
 from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, parse, station_file, with_station
 from auvdock.cli.sweep_progress import SweepProgress
 from auvdock.core.errors import ConfigError
@@ -185,19 +185,16 @@ def run(argv: Sequence[str], prog: str) -> int:
 
 def _station(argv: Sequence[str]) -> str:
     """The station that decides which settings an episode has: by flag, campaign file, or the campaign to resume."""
-    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
-    for flag in ("--station", "--campaign", "--out"):
-        finder.add_argument(flag, default=None)
-    finder.add_argument("--resume", action="store_true")
-    found, _ = finder.parse_known_args(list(argv))
-    if found.station is not None:
-        if found.station not in STATIONS and not names_file(found.station):
-            raise ConfigError("station", found.station, f"{', '.join(STATIONS)}, or the TOML file of one")
-        return found.station if found.station in STATIONS else station_kind(Path(found.station))
-    if found.campaign is not None:
-        return load_campaign(Path(found.campaign)).station
-    if found.resume and found.out is not None:
-        return read_campaign(Path(found.out)).station
+    found = find_flags(argv, "station", "campaign", "out")
+    station, campaign, out = found["station"], found["campaign"], found["out"]
+    if station is not None:
+        if station not in STATIONS and not names_file(station):
+            raise ConfigError("station", station, f"{', '.join(STATIONS)}, or the TOML file of one")
+        return station if station in STATIONS else station_kind(Path(station))
+    if campaign is not None:
+        return load_campaign(Path(campaign)).station
+    if "--resume" in argv and out is not None:
+        return read_campaign(Path(out)).station
     return CampaignCfg.station
 
 
