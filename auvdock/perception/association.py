@@ -38,6 +38,7 @@ class Association(Protocol):
         tracks: LightTracker,
         detections: Detections,
         rotation_prior: Array,
+        velocity_m_s: Array,
         heading_sigma_rad: float | None = None,
     ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`.
@@ -46,6 +47,7 @@ class Association(Protocol):
             tracks: the lights, updated with this frame.
             detections: the frame's.
             rotation_prior: (3, 3) R_camera_station of the vehicle's own attitude.
+            velocity_m_s: (3,) velocity over ground in the camera frame, as the vehicle's DVL measures it.
             heading_sigma_rad: standard deviation of the station's heading in it, None where it was surveyed.
         """
         ...

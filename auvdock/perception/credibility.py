@@ -6,7 +6,7 @@ at any range, and among a dozen spurious lights some four lie like four of six b
 1. its fit: χ² of reprojection and attitude prior at the solution, against its distribution for n lights;
 2. its range: the standard deviation along the line of sight, σ_r, must be a small share of the range, and no lamp is
    seen farther away than its light reaches;
-3. its step from the last pose: no farther than the vehicle can go and the poses' own uncertainty explains;
+3. its step from the last pose: no farther off the vehicle's way than the noise of both poses explains;
 4. chance: identities that are handed out anew must be far likelier than spurious lights in those places. That is the
    score of multiple-hypothesis tracking (Reid 1979; Blackman & Popoli 1999, section 6.2), with the pose, which nobody
    knows beforehand, integrated out by Laplace's approximation.
@@ -41,8 +41,9 @@ class CredibilityCfg:
     """... and σ_r that is always good enough: both are the error from which on an episode counts a pose as false."""
     max_range_m: float = 60.0
     """Lamps are seen no farther than this in any water (paper B saw a 30 W beacon at 50 m)."""
-    max_speed_m_s: float = 3.0
-    """The vehicle is never faster over ground."""
+    speed_error_m_s: float = 0.5
+    """The vehicle's way between two poses is known by its DVL to this speed: its noise, the hull's turning, which moves
+    the camera, acceleration since the last pose (ours)."""
     detection_probability: float = 0.9
     """Share of the beacons in view that a detector finds, for the odds of a new identification."""
     min_log_odds: float = 10.0
@@ -53,7 +54,7 @@ class CredibilityCfg:
         for name in ("fit_probability", "detection_probability"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ConfigError(name, getattr(self, name), "a probability above 0 and below 1")
-        for name in ("max_range_sigma", "max_range_sigma_m", "max_range_m", "max_speed_m_s"):
+        for name in ("max_range_sigma", "max_range_sigma_m", "max_range_m", "speed_error_m_s"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(name, getattr(self, name), "a value above 0")
 
@@ -98,16 +99,22 @@ class Credibility:
         """Mean of χ² at the pose of so many lights: their coordinates and the prior's, less the pose's six."""
         return self._freedom[lights]
 
-    def follows(self, solution: PnpSolution, before: PnpSolution, elapsed_s: float) -> bool:
+    def follows(self, solution: PnpSolution, before: PnpSolution, way_m: Array, elapsed_s: float) -> bool:
         """Whether the vehicle can have come here from an earlier pose.
 
-        What the step is longer than the way that it can go must be explained by the noise of both poses' lights. The
+        The step less the way by DVL, in excess of what that way may be wrong, must be noise of both poses' lights. The
         attitude prior's error, which makes most of a distant pose's σ, is common to both and moves neither from the
         other: with the prior's weight P⁻¹, light alone makes Σ - Σ P⁻¹ Σ of a pose's covariance Σ.
+
+        Args:
+            solution: the pose.
+            before: the earlier one.
+            way_m: (3,) way since then in the station frame.
+            elapsed_s: time since then.
         """
-        step = solution.T_station_camera()[:3, 3] - before.T_station_camera()[:3, 3]
+        step = solution.T_station_camera()[:3, 3] - before.T_station_camera()[:3, 3] - way_m
         length_m = math.sqrt(float(step @ step))
-        excess_m = length_m - self._cfg.max_speed_m_s * elapsed_s
+        excess_m = length_m - self._cfg.speed_error_m_s * elapsed_s
         if excess_m <= 0.0:
             return True
         along = step / length_m

@@ -87,6 +87,7 @@ class HungarianRansacAssociation:
         tracks: LightTracker,
         detections: Detections,
         rotation_prior: Array,
+        velocity_m_s: Array,
         heading_sigma_rad: float | None = None,
     ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`."""

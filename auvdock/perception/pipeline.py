@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Detections, Percept, Proprioception
@@ -95,6 +97,7 @@ class BeaconPerception:
         self._forward = ForwardBeacon(cfg.rotating, camera, rotating) if rotating is not None else None
         self._surveyed = heading_surveyed
         self._facing = FacingHeading(camera)
+        self._camera_body = np.ascontiguousarray(camera.T_body_camera[:3, :3].T)
         self._tracks = LightTracker(cfg.tracker, camera.rate_hz, camera.width_px, camera.height_px)
         self._prior = AttitudePrior(camera, math.radians(cfg.station_yaw_deg))
         sigma = cfg.tracker.pixel_sigma_px
@@ -127,12 +130,14 @@ class BeaconPerception:
             if self._forward.mask.any():
                 fixed = detections.select(~self._forward.mask)
         tracks.update(fixed)
+        velocity = self._camera_body @ proprioception.velocity_ground_m_s
         if self._surveyed:
-            associated = self._association.update(tracks, fixed, self._prior.rotation(proprioception))
+            prior = self._prior.rotation(proprioception)
+            associated = self._association.update(tracks, fixed, prior, velocity)
         else:
             heading, sigma = self._heading(proprioception)
             prior = self._prior.rotation(proprioception, heading)
-            associated = self._association.update(tracks, fixed, prior, sigma)
+            associated = self._association.update(tracks, fixed, prior, velocity, sigma)
         long_range, entrance = self._line_of_sight.update(tracks, associated.solution)
         self._facing.note(long_range)
         return Percept(

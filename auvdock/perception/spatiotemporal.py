@@ -74,17 +74,20 @@ class SpatiotemporalAssociation:
         self._last: PnpSolution | None = None
         self._believed: PnpSolution | None = None
         self._age = 0
+        self._way_m: Array = np.zeros(3)
 
     def update(
         self,
         tracks: LightTracker,
         detections: Detections,
         rotation_prior: Array,
+        velocity_m_s: Array,
         heading_sigma_rad: float | None = None,
     ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`."""
         self._solver.heading_sigma_rad = heading_sigma_rad
         self._age += 1
+        self._way_m = rotation_prior.T @ velocity_m_s * (self._age / self._rate_hz)
         if self._age > _MAX_POSE_AGE:
             self._last = self._believed = None
         result = self._solve_labelled(tracks, detections, rotation_prior)
@@ -145,7 +148,7 @@ class SpatiotemporalAssociation:
         if not self._credibility.holds(solution):
             return False
         before = self._believed
-        return before is None or self._credibility.follows(solution, before, self._age / self._rate_hz)
+        return before is None or self._credibility.follows(solution, before, self._way_m, self._age / self._rate_hz)
 
     def _without_worst(
         self, tracks: LightTracker, lights: Array, owners: IntArray, prior: Array

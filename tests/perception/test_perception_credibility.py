@@ -143,7 +143,7 @@ def test_a_step_is_believed_as_far_as_speed_and_noise_reach():
     """Two poses of one frame's distance, each with noise of its own, share the prior's error of 5°, as in a flight.
 
     At most as many are refused as is stated, 2 % (within 3.3 standard deviations of 500 draws); fewer, since the
-    vehicle's own way is taken off. A vehicle at 2 m/s without noise is never refused, a step of 3 m always.
+    error that the way may have is taken off. A vehicle without noise is never refused, a step of 3 m always.
     """
     rng = np.random.default_rng(4)
     credibility = Credibility(CredibilityCfg(fit_probability=0.02), CAMERA, BLUE_LAMPS, PRIOR_RAD)
@@ -156,12 +156,13 @@ def test_a_step_is_believed_as_far_as_speed_and_noise_reach():
             solved(truth, error @ truth[:3, :3].T, rng.normal(0.0, SIGMA_PX, (6, 2)), np.arange(6))
             for truth in (one, two)
         )
-        refused += not credibility.follows(second, first, 1.0 / 30.0)
+        way = two[:3, 3] - one[:3, 3]
+        refused += not credibility.follows(second, first, way, 1.0 / 30.0)
         far = two.copy()
         far[0, 3] += 3.0
         exact = [solved(truth, truth[:3, :3].T, np.zeros((6, 2)), np.arange(6)) for truth in (one, two, far)]
-        assert credibility.follows(exact[1], exact[0], 1.0 / 30.0)
-        assert not credibility.follows(exact[2], exact[0], 1.0 / 30.0)
+        assert credibility.follows(exact[1], exact[0], way, 1.0 / 30.0)
+        assert not credibility.follows(exact[2], exact[0], way, 1.0 / 30.0)
     assert refused <= 0.02 * trials + 3.3 * math.sqrt(0.02 * 0.98 * trials), refused
 
 
