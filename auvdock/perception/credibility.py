@@ -28,6 +28,11 @@ from auvdock.perception.pnp import PnpSolution
 
 __all__ = ["Credibility", "CredibilityCfg"]
 
+_UNIT_FRAMES = 15.0
+"""Length of the running mean of the noise (ours)."""
+_LEAST_UNIT, _GREATEST_UNIT = 0.16, 4.0
+"""Noise is taken for 0.4 times σ_px at least and for twice σ_px at most (ours)."""
+
 
 @dataclass(frozen=True)
 class CredibilityCfg:
@@ -99,7 +104,9 @@ class Credibility:
         """Mean of χ² at the pose of so many lights: their coordinates and the prior's, less the pose's six."""
         return self._freedom[lights]
 
-    def follows(self, solution: PnpSolution, before: PnpSolution, way_m: Array, elapsed_s: float) -> bool:
+    def follows(
+        self, solution: PnpSolution, before: PnpSolution, way_m: Array, elapsed_s: float, unit_variance: float = 1.0
+    ) -> bool:
         """Whether the vehicle can have come here from an earlier pose.
 
         The step less the way by DVL, in excess of what that way may be wrong, must be noise of both poses' lights. The
@@ -111,6 +118,7 @@ class Credibility:
             before: the earlier one.
             way_m: (3,) way since then in the station frame.
             elapsed_s: time since then.
+            unit_variance: of the lights' noise over what σ_px says, see `unit_variance_after`.
         """
         step = solution.T_station_camera()[:3, 3] - before.T_station_camera()[:3, 3] - way_m
         length_m = math.sqrt(float(step @ step))
@@ -119,7 +127,19 @@ class Credibility:
             return True
         along = step / length_m
         variance = self._noise_along(solution, along) + self._noise_along(before, along)
-        return excess_m**2 <= self._worst_step * variance
+        return excess_m**2 <= self._worst_step * unit_variance * variance
+
+    def unit_variance_after(self, unit_variance: float, solution: PnpSolution) -> float:
+        """What is known of the noise after one more pose: a running mean of χ² / (2 n - 6) (Mehra 1970), in bounds.
+
+        σ_px is set for the worst that lights may do; in clear water they do ten times better, and a step that noise of
+        σ_px could explain is none of theirs. The prior adds to χ², so that the mean is too great rather than too small.
+        """
+        freedom = 2.0 * len(solution.residual_px) - 6.0
+        if freedom <= 0.0:
+            return unit_variance
+        mean = unit_variance + (solution.cost / freedom - unit_variance) / _UNIT_FRAMES
+        return min(max(mean, _LEAST_UNIT), _GREATEST_UNIT)
 
     def _noise_along(self, solution: PnpSolution, along: Array) -> float:
         """Variance of the position along a direction (3,) that the noise of the lights makes, m²."""

@@ -22,6 +22,8 @@ __all__ = ["SpatiotemporalAssociation"]
 
 _MAX_POSE_AGE = 10
 """Frames after which the last pose no longer helps to solve the next."""
+_MAX_STRAYED = 3
+"""Frames in a row whose pose is a step that the vehicle cannot have made, before the identities are doubted."""
 _MIN_LIT = 3
 _REACQUIRE = 0.15
 _REACQUIRE_PX = 2.0
@@ -30,9 +32,10 @@ _REACQUIRE_PX = 2.0
 class SpatiotemporalAssociation:
     """Keeps identities over time.
 
-    Every frame: solve the pose from the lights that carry an identity; verify it by reprojection; if it fails, drop
-    the worst light, and if that does not mend it, drop all identities and authenticate again in the same frame. Lights
-    that appear where a lost beacon must be are given its identity.
+    Every frame: solve the pose from the lights that carry an identity; verify it; if it fails, drop the worst light,
+    and if that does not mend it, drop all identities and authenticate again in the same frame. A pose that is only too
+    far from the last one is none, and costs the identities if it happens four times in a row. Lights that appear where
+    a lost beacon must be are given its identity.
 
     A pose is `measured` when at least three authenticated beacons were detected in this frame. With four or more it
     rests on them alone; with three, the predicted positions of the others support it (weighted by their tracks'
@@ -75,6 +78,8 @@ class SpatiotemporalAssociation:
         self._believed: PnpSolution | None = None
         self._age = 0
         self._way_m: Array = np.zeros(3)
+        self._unit_variance = 1.0
+        self._strayed = 0
 
     def update(
         self,
@@ -90,6 +95,7 @@ class SpatiotemporalAssociation:
         self._way_m = rotation_prior.T @ velocity_m_s * (self._age / self._rate_hz)
         if self._age > _MAX_POSE_AGE:
             self._last = self._believed = None
+            self._unit_variance = 1.0
         result = self._solve_labelled(tracks, detections, rotation_prior)
         if result is None and self._authenticate(tracks, rotation_prior):
             result = self._solve_labelled(tracks, detections, rotation_prior)
@@ -97,6 +103,7 @@ class SpatiotemporalAssociation:
             return Associated()
         if result.solution is not None and result.array_count >= _MIN_LIT:
             self._last = self._believed = result.solution
+            self._unit_variance = self._credibility.unit_variance_after(self._unit_variance, result.solution)
             self._age = 0
             if result.array_count < len(self._array_m):
                 self._reacquire(tracks, result.solution)
@@ -127,12 +134,20 @@ class SpatiotemporalAssociation:
             alone = self._verified(lights[there], seen, prior)
             if alone is not None:
                 solution, owners = alone, owners[there]
-        if solution is None and seen >= 5:
-            solution, owners = self._without_worst(tracks, lights, owners, prior)
-            seen = len(owners)
+        if seen >= 5 and (solution is None or not self._follows(solution)):
+            better, rest = self._without_worst(tracks, lights, owners, prior)
+            if better is not None:
+                solution, owners, seen = better, rest, len(rest)
         if solution is None:
             tracks.beacon_id[:] = -1
             return None
+        if not self._follows(solution):
+            self._strayed += 1
+            if self._strayed <= _MAX_STRAYED:
+                return Associated()
+            tracks.beacon_id[:] = -1
+            return None
+        self._strayed = 0
         ids = tuple(owners[:, 1].tolist())
         return Associated(pose_estimate(solution, ids, seen >= _MIN_LIT), seen, solution)
 
@@ -141,14 +156,14 @@ class SpatiotemporalAssociation:
         solution = self._solver.solve_lights(lights, prior, self._last)
         if solution is None or (seen and solution.error_px > self._pnp.max_reprojection_px):
             return None
-        return solution if self._is_believed(solution) else None
+        return solution if self._credibility.holds(solution) else None
 
-    def _is_believed(self, solution: PnpSolution) -> bool:
-        """Whether a pose can be right, by itself and after the last one that was."""
-        if not self._credibility.holds(solution):
-            return False
-        before = self._believed
-        return before is None or self._credibility.follows(solution, before, self._way_m, self._age / self._rate_hz)
+    def _follows(self, solution: PnpSolution) -> bool:
+        """Whether a pose can come after the last one that was believed."""
+        before, elapsed_s = self._believed, self._age / self._rate_hz
+        return before is None or self._credibility.follows(
+            solution, before, self._way_m, elapsed_s, self._unit_variance
+        )
 
     def _without_worst(
         self, tracks: LightTracker, lights: Array, owners: IntArray, prior: Array
@@ -158,7 +173,9 @@ class SpatiotemporalAssociation:
         left_out = 0
         for index in range(len(lights)):
             solution = self._verified(np.delete(lights, index, axis=0), len(lights) - 1, prior)
-            if solution is not None and (best is None or solution.error_px < best.error_px):
+            if solution is None or not self._follows(solution):
+                continue
+            if best is None or solution.error_px < best.error_px:
                 best, left_out = solution, index
         if best is None:
             return None, owners
@@ -213,7 +230,9 @@ class SpatiotemporalAssociation:
 
     def _likely(self, solution: PnpSolution, identity: IntArray, pixels: Array, others_px: Array) -> bool:
         """Whether new identities hold: a good fit, and far likelier than spurious lights in those places."""
-        if solution.error_px > self._pnp.max_reprojection_px or not self._is_believed(solution):
+        if solution.error_px > self._pnp.max_reprojection_px or not self._credibility.holds(solution):
+            return False
+        if not self._follows(solution):
             return False
         unused = np.setdiff1d(np.arange(len(self._blue_m)), np.flatnonzero(identity >= 0))
         others_px = np.vstack([np.delete(pixels, identity[identity >= 0], axis=0), others_px])
