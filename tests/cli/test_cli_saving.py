@@ -6,6 +6,7 @@ import errno
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -82,14 +83,16 @@ class Interrupted:
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
 def test_what_is_interrupted_is_never_taken_for_whole(error, tmp_path):
     path, saving = tmp_path / "episode.rrd", Saving()
+    whole: Any = Interrupted(None)
+    part: Any = Interrupted(error)
     with pytest.raises(error):
-        run_recorded(Interrupted(error), 0, path, saving, whole=True)
+        run_recorded(part, 0, path, saving, whole=True)
     assert list(tmp_path.iterdir()) == []
-    run_recorded(Interrupted(None), 0, path, saving, whole=True)
+    run_recorded(whole, 0, path, saving, whole=True)
     assert list(tmp_path.iterdir()) == [path]
     assert saving.written == [str(path)]
     with pytest.raises(error):  # of a docking as much as was flown is kept
-        run_recorded(Interrupted(error), 0, tmp_path / "docking.rrd", saving)
+        run_recorded(part, 0, tmp_path / "docking.rrd", saving)
     assert (tmp_path / "docking.rrd").exists()
 
 
