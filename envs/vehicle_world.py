@@ -127,13 +127,13 @@ class VehicleWorld(ABC):
             _ = station.layout  # before whoever uses it: here it is known where its settings lie
         with located("world.sim."):
             vehicle = load_vehicle(cfg.sim.vehicle)
-        self.simulator = Simulator(cfg.sim, station, vehicle)
         with located("world.camera."):
             self.camera = make_camera(vehicle)
         with located("world."):
             self.water = load_water(cfg.water)
             if cfg.attenuation_per_m is not None:
                 self.water = with_attenuation(self.water, cfg.attenuation_per_m)
+        self.simulator = Simulator(cfg.sim, station, vehicle)  # last: its loops may have to be compiled
         self._limits, self._hold_s, self._control_s = cfg.limits, station.latch.hold_s, 1.0 / cfg.control_hz
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)
         self._steps_per_frame = round(cfg.sim.physics_hz / self.camera.rate_hz)

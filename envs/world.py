@@ -51,6 +51,7 @@ class DockingWorld(VehicleWorld):
         Raises:
             ConfigError: a preset that does not exist or a value that does not fit.
         """
+        model = detection_model(cfg.detection_model, detector) if cfg.fidelity == "beacons" else None
         super().__init__(cfg, cfg.station, lambda vehicle: mounted_camera(cfg.camera, vehicle.bow_camera))
         self.cfg = cfg
         self._clock: StationClock | None = None
@@ -64,8 +65,7 @@ class DockingWorld(VehicleWorld):
             self.simulator.T_world_station,
         )
         self._beacon_sensor: BeaconSensor | None = None
-        if cfg.fidelity == "beacons":
-            model = detection_model(cfg.detection_model, detector)
+        if model is not None:
             self._beacon_sensor = BeaconSensor(*self._optics, detector, model=model, rotating=cfg.station.rotating)
 
     @cached_property

@@ -67,6 +67,8 @@ KIND_WORDS: Mapping[type[AxisValue], str] = {
     str: "text",
 }
 _TAIL = 0.025
+_MOST_VALUES = 1000
+"""Of a grid; each is tried before a campaign begins."""
 
 
 @dataclass(frozen=True)
@@ -103,8 +105,9 @@ class AxisCfg:
             raise ConfigError("values", (), f"values for the axis {self.name!r}, or low and high in their place")
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
             raise ConfigError("low", self.low, f"finite numbers with low below high, which is {self.high}")
-        if self.count < 0 or self.count == 1:
-            raise ConfigError("count", self.count, "2 or more grid values, or 0 to draw from a distribution")
+        if self.count < 0 or self.count == 1 or self.count > _MOST_VALUES:
+            remedy = f"2 or more grid values, up to {_MOST_VALUES}, or 0 to draw from a distribution"
+            raise ConfigError("count", self.count, remedy)
         if self.distribution not in DISTRIBUTIONS:
             raise ConfigError("distribution", self.distribution, f"one of {', '.join(DISTRIBUTIONS)}")
         if self.distribution == "log_uniform" and self.low <= 0.0:

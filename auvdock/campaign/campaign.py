@@ -165,7 +165,7 @@ def _rounds_by_cell(plan: Plan, outcomes: dict[int, bool | None]) -> Iterator[Se
 
     Episode i lies in cell i mod (number of cells); a cell has its share of the plan's episodes, never other cells'.
     """
-    cells: dict[int, list[bool | None]] = {cell: [] for cell in range(plan.cells)}
+    cells: dict[int, list[bool | None]] = {cell: [] for cell in range(min(plan.cells, len(plan)))}
     for first in range(0, -(-len(plan) // plan.cells), CELL_EPISODES):
         last = first + CELL_EPISODES
         visited = [visit * plan.cells + cell for visit in range(first, last) for cell in cells]

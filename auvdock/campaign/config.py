@@ -23,6 +23,8 @@ STATIONS: Mapping[str, Callable[[int], AnyEpisodeCfg]] = {
     "landing": landing_level_cfg,
 }
 """Stations that campaigns can dock into, and what an episode of a difficulty level is there."""
+_MOST_EPISODES = 1_000_000
+"""Of which a second each take a core eleven days; their seeds differ (`plan`)."""
 _MOST_CORNERED = 6
 _LEAST_LIMIT_S, _TIMES_SIMULATED = 600.0, 5.0
 
@@ -62,9 +64,10 @@ class CampaignCfg:
             raise ConfigError("station", self.station, f"one of {', '.join(STATIONS)}")
         if self.sampling not in SAMPLINGS:
             raise ConfigError("sampling", self.sampling, f"one of {', '.join(SAMPLINGS)}")
-        for name, least in (("episodes", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise ConfigError(name, getattr(self, name), f"a whole number of {least} or more")
+        if not 1 <= self.episodes <= _MOST_EPISODES:
+            raise ConfigError("episodes", self.episodes, f"a whole number of 1 or more, up to {_MOST_EPISODES}")
+        if self.seed < 0:
+            raise ConfigError("seed", self.seed, "a whole number of 0 or more")
         if not 0.0 <= self.until_ci < 0.5:
             raise ConfigError("until_ci", self.until_ci, "half an interval's width, above 0 and below 0.5, or 0")
         if self.until_ci_per_cell and not self.until_ci:
@@ -74,13 +77,12 @@ class CampaignCfg:
         names = [axis.name for axis in self.axes]
         if len(set(names)) != len(names):
             raise ConfigError("axes", names, "each axis once")
+        for axis in self.axes:
+            unknown = [value for value in self._ends(axis) if value not in LEVELS] if axis.name == "level" else []
+            if unknown:
+                raise ConfigError("level", unknown[0], f"one of {', '.join(map(str, LEVELS))}")
         base = self.base(self.level)
-        ends = [axis.grid or tuple(axis.drawn(end, self.kind(axis)) for end in (0.0, 1.0)) for axis in self.axes]
-        for axis, values in zip(self.axes, ends, strict=True):
-            for value in values:
-                if axis.name == "level" and value not in LEVELS:
-                    raise ConfigError("level", value, f"one of {', '.join(map(str, LEVELS))}")
-        for point in _points(ends):
+        for point in self.points():
             base.override(self.changes_at(point))
 
     @property
@@ -92,6 +94,22 @@ class CampaignCfg:
         if self.episode_limit_s is not None:
             return self.episode_limit_s
         return max(_LEAST_LIMIT_S, _TIMES_SIMULATED * self.base(self.level).world.limits.max_time_s)
+
+    def points(self) -> Iterable[tuple[AxisValue, ...]]:
+        """Places on the axes that have to be possible: every value once, and the corners where they are not too many.
+
+        Of an axis that is drawn these are its ends.
+        """
+        ends = [self._ends(axis) for axis in self.axes]
+        first = tuple(values[0] for values in ends)
+        points = [first]
+        points += [(*first[:place], value, *first[place + 1 :]) for place, them in enumerate(ends) for value in them]
+        if 1 < len(ends) <= _MOST_CORNERED:
+            points += product(*((values[0], values[-1]) for values in ends))
+        return dict.fromkeys(points)
+
+    def _ends(self, axis: AxisCfg) -> Sequence[AxisValue]:
+        return axis.grid or tuple(axis.drawn(end, self.kind(axis)) for end in (0.0, 1.0))
 
     def base(self, level: int) -> AnyEpisodeCfg:
         """What all episodes of a level share.
@@ -128,15 +146,6 @@ class CampaignCfg:
             ConfigError: a value that is not of its setting's type.
         """
         return joined(self.changes(axis, value) for axis, value in zip(self.axes, point, strict=True))
-
-
-def _points(ends: Sequence[Sequence[AxisValue]]) -> Iterable[tuple[AxisValue, ...]]:
-    """Places on the axes that have to be possible: every value once, and the corners where they are not too many."""
-    first = tuple(values[0] for values in ends)
-    points = [(*first[:place], value, *first[place + 1 :]) for place, values in enumerate(ends) for value in values]
-    if 1 < len(ends) <= _MOST_CORNERED:
-        points += product(*((values[0], values[-1]) for values in ends))
-    return dict.fromkeys(points)
 
 
 def campaign_from_plain(data: Mapping[str, Any]) -> CampaignCfg:

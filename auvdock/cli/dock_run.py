@@ -15,8 +15,8 @@ from auvdock.cli.console import tell
 from auvdock.cli.display import ProgressDisplay, print_result
 from auvdock.cli.dock_flags import DockFlags
 from auvdock.cli.early_flags import find_flags
-from auvdock.cli.parsing import base_config, parse, station_file, with_station
-from auvdock.cli.recorded import run_recorded
+from auvdock.cli.parsing import at_least, base_config, parse, station_file, with_station
+from auvdock.cli.recorded import check_recordable, run_recorded
 from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.episode.result import EpisodeResult
@@ -41,6 +41,9 @@ def run_dock(command: type[DockFlags], argv: Sequence[str], prog: str, station: 
     """
     stored = _stored(argv, station)
     args = parse(command, argv, prog, _defaults(command, argv, stored, station))
+    at_least(0, seed=args.seed)
+    if args.record is not None:
+        check_recordable(args.record)  # now: to make a world takes a minute where its loops have to be compiled
     runner = EpisodeRunner(args.resolve())
     if stored is None or (runner.cfg, args.seed) != (stored.cfg, stored.spec.seed):
         return _fly(runner, args, title)  # no episode of a campaign, or flags made it another one
@@ -79,8 +82,6 @@ def _defaults(command: type[DockFlags], argv: Sequence[str], stored: StoredEpiso
 def _fly(
     runner: EpisodeRunner, flags: DockFlags, title: str, check: Callable[[EpisodeResult], None] | None = None
 ) -> int:
-    if flags.seed < 0:
-        raise ConfigError("seed", flags.seed, "a whole number of 0 or more")
     cv2.setNumThreads(1)  # frames this small gain nothing from OpenCV's threads and stall on a busy machine
     shown: list[EpisodeObserver] = [] if flags.json else [ProgressDisplay()]
     saving = Saving()

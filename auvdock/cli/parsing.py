@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import io
-from collections.abc import Sequence
-from contextlib import redirect_stderr
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager, redirect_stderr
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,7 +31,16 @@ from auvdock.core.strict import names_file, read_toml, recheck
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.optics.water import WaterCfg, load_water
 
-__all__ = ["DEFAULT_LEVEL", "at_least", "base_config", "level_and_file", "parse", "station_file", "with_station"]
+__all__ = [
+    "DEFAULT_LEVEL",
+    "at_least",
+    "base_config",
+    "level_and_file",
+    "named_by_flag",
+    "parse",
+    "station_file",
+    "with_station",
+]
 
 T = TypeVar("T")
 
@@ -118,6 +127,17 @@ def at_least(least: int, **values: int | None) -> None:
     for name, value in values.items():
         if value is not None and value < least:
             raise ConfigError(name.replace("_", "-"), value, f"a whole number of {least} or more")
+
+
+@contextmanager
+def named_by_flag(**flags: str) -> Generator[None]:
+    """Name a setting in errors by the flag that gives it here: `cone_deg="cone"`; others keep their names."""
+    try:
+        yield
+    except ConfigError as error:
+        if error.field not in flags:
+            raise
+        raise ConfigError(flags[error.field], error.value, error.remedy) from error
 
 
 def base_config(argv: Sequence[str], station: str) -> AnyEpisodeCfg:

@@ -16,12 +16,11 @@ from rich.table import Table
 
 from auvdock.cli import exit_codes
 from auvdock.cli.console import command_line, counting_progress, output, shown
-from auvdock.cli.parsing import parse
+from auvdock.cli.parsing import at_least, named_by_flag, parse
 from auvdock.cli.saving import Saving
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import CameraCfg
-from auvdock.core.errors import ConfigError
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.strict import load_toml
 from auvdock.planning.array_design import ArrayBounds, physical_layout
@@ -34,6 +33,9 @@ from auvdock.planning.station_file import with_lights, write_station
 from auvdock.planning.sweeps import SweepPoint, sweep, variants
 
 __all__ = ["Plan", "run", "section_panels"]
+
+_LEAST_WIDTH_PX = 32
+"""So that the height, 9/16 of it, is a camera's too."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +82,15 @@ def run(argv: Sequence[str], prog: str) -> int:
     args = parse(Plan, argv, prog)
     station = load_toml(ConicalStationCfg, args.station)
     layout = station.layout
-    camera = CameraCfg(width_px=args.width, height_px=round(args.width * 9 / 16))
-    cfg = PlanCfg(args.water, args.attenuation, camera, min_lights=args.min_lights, resolution=args.resolution)
-    sees = make_detectability(layout, cfg)
+    with named_by_flag(attenuation_per_m="attenuation", cone_deg="cone", min_lights="min-lights", width_px="width"):
+        at_least(_LEAST_WIDTH_PX, width=args.width)
+        camera = CameraCfg(width_px=args.width, height_px=round(args.width * 9 / 16))
+        cfg = PlanCfg(args.water, args.attenuation, camera, min_lights=args.min_lights, resolution=args.resolution)
+        sees = make_detectability(layout, cfg)
+        search = _search(args, station)
+    cases = variants(station) if args.sweep else []
     if args.out is not None:
         make_folder(args.out)
-    cases = variants(station) if args.sweep else []
-    search = _search(args, station)
     layouts = search.population * (search.generations + 1) if search is not None else 0
     started = time.perf_counter()
     with counting_progress() as progress:
@@ -182,8 +186,7 @@ def section_panels(
 def _search(args: Plan, station: ConicalStationCfg) -> OptimiseCfg | None:
     if args.optimise is None:
         return None
-    if args.seed < 0:
-        raise ConfigError("seed", args.seed, "a whole number of 0 or more")
+    at_least(0, seed=args.seed)
     power = sum(beacon.power_w for beacon in station.layout.beacons if beacon.role == "array")
     return OptimiseCfg(args.optimise, args.bounds, power, generations=args.generations, cone_deg=args.cone)
 

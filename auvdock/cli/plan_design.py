@@ -13,9 +13,8 @@ from rich.table import Table
 
 from auvdock.cli import exit_codes
 from auvdock.cli.console import command_line, counting_progress, output
-from auvdock.cli.parsing import at_least, parse
+from auvdock.cli.parsing import at_least, named_by_flag, parse
 from auvdock.cli.saving import Saving
-from auvdock.core.errors import ConfigError
 from auvdock.core.station import load_conical_station
 from auvdock.experiments.guidance_space_design import (
     Campaign,
@@ -64,13 +63,13 @@ def run_guidance_design(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(GuidanceDesign, argv, prog)
     at_least(0, episodes=args.episodes, seed=args.seed)
-    if args.workers is not None and args.workers < 1:
-        raise ConfigError("workers", args.workers, "1 or more")
+    at_least(1, workers=args.workers)
     load_water(args.water)
+    cfg = default_search()
+    with named_by_flag(cone_deg="cone"):
+        search = dataclasses.replace(cfg, cone_deg=args.cone)
     if args.out is not None:
         make_folder(args.out)
-    cfg = default_search()
-    search = dataclasses.replace(cfg, cone_deg=args.cone)
     layouts = cfg.population * (cfg.generations + 1)
     campaigns: list[Campaign] = []
     with counting_progress() as progress:

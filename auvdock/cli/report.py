@@ -88,11 +88,10 @@ def _record(campaign: Campaign, count: int, saving: Saving) -> None:
     wanted = [number for number in failed[:count] if not recording_path(campaign.folder, number).exists()]
     plan = Plan(campaign.cfg)
     for number in wanted:
-        path = recording_path(campaign.folder, number)
         spec = plan[number]
-        run_recorded(EpisodeRunner(plan.config(spec)), spec.seed, path, saving)
-        if str(path) not in saving.written:
-            path.unlink(missing_ok=True)  # or the next report would take it for whole
+        path = recording_path(campaign.folder, number)
+        # What is there, the next report takes for whole.
+        run_recorded(EpisodeRunner(plan.config(spec)), spec.seed, path, saving, whole=True)
 
 
 def _plain(campaign: Campaign, comparison: Comparison | None, page: Path) -> dict[str, object]:

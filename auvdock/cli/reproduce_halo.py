@@ -15,7 +15,7 @@ from rich.table import Table
 
 from auvdock.cli import exit_codes
 from auvdock.cli.console import counting_progress, output
-from auvdock.cli.parsing import parse
+from auvdock.cli.parsing import named_by_flag, parse
 from auvdock.cli.saving import Saving
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
@@ -125,7 +125,8 @@ def _case(args: Halo, name: str) -> int:
         raise ConfigError("range", None, "--range M, the distance to the lamp")
     water = load_water(name)
     if args.attenuation is not None:
-        water = with_attenuation(water, args.attenuation)
+        with named_by_flag(attenuation_per_m="attenuation"):
+            water = with_attenuation(water, args.attenuation)
     case = halo_case(water, args.range_m, args.wavelength_nm)
     halo, wells = _by_angle(case.halo), _by_angle(case.wells)
     plain = {

@@ -22,16 +22,16 @@ from auvdock.campaign.config import STATIONS, CampaignCfg
 from auvdock.campaign.executor import Executor, SerialExecutor
 from auvdock.campaign.files import keep_files, load_campaign, station_kind
 from auvdock.campaign.job import DockingJob
-from auvdock.campaign.plan import Plan
 from auvdock.campaign.process import ProcessExecutor, usable_cores
 from auvdock.campaign.provenance import manifest_of
+from auvdock.campaign.rehearsal import rehearse
 from auvdock.campaign.store import Store, read_campaign
 from auvdock.cli.console import command_line, messages, output, tell
 from auvdock.cli.early_flags import find_flags
-from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, parse, station_file, with_station
+from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, named_by_flag, parse, station_file, with_station
 from auvdock.cli.sweep_progress import SweepProgress
 from auvdock.core.errors import ConfigError
-from auvdock.core.strict import names_file, read_toml, to_plain
+from auvdock.core.strict import names_file, read_toml, recheck, to_plain
 from auvdock.episode.config import AnyEpisodeCfg, EpisodeCfg, LandingEpisodeCfg
 
 __all__ = ["Sweep", "plain_summary", "print_summary", "run"]
@@ -48,6 +48,7 @@ AXIS_FLAGS = (
     "controller",
 )
 """Flags that may vary; `--axis` takes any other setting."""
+_MOST_WORKERS = 4096
 
 
 @dataclass(frozen=True)
@@ -166,9 +167,9 @@ def run(argv: Sequence[str], prog: str) -> int:
     else:
         args = parse(Sweep, argv, prog, Sweep(out=tyro.MISSING, episode=base))
     cfg = _resolve(args, args.episode, station)
-    if args.workers is not None and args.workers < 1:
-        raise ConfigError("workers", args.workers, "a whole number of 1 or more")
-    Plan(cfg).config(Plan(cfg)[0])
+    if args.workers is not None and not 1 <= args.workers <= _MOST_WORKERS:
+        raise ConfigError("workers", args.workers, f"a whole number of 1 or more, up to {_MOST_WORKERS}")
+    rehearse(cfg)
     executor = _executor(args, cfg)
     store = Store(args.out, cfg, manifest_of(cfg), args.resume)
     if store.is_mixed:
@@ -247,12 +248,12 @@ def _resolve(args: SweepFlags, episode: AnyEpisodeCfg, station: str) -> Campaign
     asked = bool(plain or changes or axes or args.campaign)
     if args.resume and not asked:
         return read_campaign(args.out)
-    if args.campaign is None:
-        return keep_files(CampaignCfg(**plain, axes=tuple(axes), episode=changes))
-    there = load_campaign(args.campaign)
+    there = CampaignCfg() if args.campaign is None else load_campaign(args.campaign)
     kept = [axis for axis in there.axes if axis.name not in {axis.name for axis in axes}]
-    wanted = dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=joined((there.episode, changes)))
-    return keep_files(wanted)
+    with named_by_flag(until_ci="until-ci", until_ci_per_cell="until-ci-per-cell", episode_limit_s="episode-limit"):
+        changed = joined((there.episode, changes))
+        wanted = dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=changed)
+        return keep_files(recheck(wanted))
 
 
 def _start(args: SweepFlags, station: str) -> AnyEpisodeCfg:

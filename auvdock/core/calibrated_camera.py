@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.camera import Camera
+from auvdock.core.camera import Camera, check_size
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import make_transform, rotation_looking_along
 
@@ -59,14 +59,17 @@ class CalibratedCameraCfg:
 
     def __post_init__(self) -> None:
         """Refuse what no camera can be."""
-        for name in ("width_px", "height_px"):
-            if getattr(self, name) < 16:
-                raise ConfigError(name, getattr(self, name), "at least 16 pixels")
+        check_size(self.width_px, self.height_px)
         if not 0.0 < self.rate_hz <= 1000.0:
             raise ConfigError("rate_hz", self.rate_hz, "a frame rate above 0 Hz and up to 1000 Hz")
         for name in ("focal_length_m", "pixel_width_m", "pixel_height_m"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ConfigError(name, getattr(self, name), "a length above 0 m")
+        for side_px, pitch_m in ((self.width_px, self.pixel_width_m), (self.height_px, self.pixel_height_m)):
+            seen_deg = math.degrees(2.0 * math.atan2(0.5 * side_px * pitch_m, self.focal_length_m))
+            if not 1.0 <= seen_deg <= 150.0:
+                remedy = "a length with which the sensor sees 1 to 150 degrees either way"
+                raise ConfigError("focal_length_m", self.focal_length_m, f"{remedy} ({seen_deg:.3g} with this)")
         column, row = self.principal_point_px
         if not (0.0 <= column < self.width_px and 0.0 <= row < self.height_px):
             raise ConfigError("principal_point_px", self.principal_point_px, "a point on the sensor")

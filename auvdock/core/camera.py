@@ -13,7 +13,21 @@ from auvdock.core.arrays import Array, BoolArray, check_shape
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import make_transform, rotation_looking_along
 
-__all__ = ["Camera", "CameraCfg", "make_camera"]
+__all__ = ["Camera", "CameraCfg", "check_size", "make_camera"]
+
+_MOST_PX = 8192
+"""Along one side: a frame of as many either way takes 0.8 GB while it is rendered."""
+
+
+def check_size(width_px: int, height_px: int) -> None:
+    """Refuse an image that is too small to show anything, or too large to render.
+
+    Raises:
+        ConfigError: such an image; its field is `width_px` or `height_px`.
+    """
+    for name, side in (("width_px", width_px), ("height_px", height_px)):
+        if not 16 <= side <= _MOST_PX:
+            raise ConfigError(name, side, f"at least 16 pixels and at most {_MOST_PX}")
 
 
 @dataclass(frozen=True)
@@ -33,9 +47,7 @@ class CameraCfg:
 
     def __post_init__(self) -> None:
         """Refuse what no camera can be."""
-        for name in ("width_px", "height_px"):
-            if getattr(self, name) < 16:
-                raise ConfigError(name, getattr(self, name), "at least 16 pixels")
+        check_size(self.width_px, self.height_px)
         if not 0.0 < self.rate_hz <= 1000.0:
             raise ConfigError("rate_hz", self.rate_hz, "a frame rate above 0 Hz and up to 1000 Hz")
         for name in ("horizontal_fov_deg", "vertical_fov_deg"):

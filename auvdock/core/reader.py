@@ -16,22 +16,19 @@ from functools import cache
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from auvdock.core.errors import ConfigError, located
+from auvdock.core.magnitudes import FINITE, WHOLE, check_magnitude
 
-__all__ = ["FINITE", "from_mapping", "hints_of", "known_table", "read_value"]
+__all__ = ["from_mapping", "hints_of", "known_table", "read_value"]
 
 T = TypeVar("T")
 
-FINITE = "a finite number"
-"""What a float is asked to be."""
 _WANTED: Mapping[Any, str] = {
     float: FINITE,
-    int: "a whole number of at most 64 bits",
+    int: WHOLE,
     str: "text",
     bool: "true or false",
     types.NoneType: "nothing",
 }
-_LARGEST_INT = 2**63 - 1
-"""TOML's whole numbers have 64 bits."""
 _LARGEST_FLOAT = int(float.fromhex("0x1.fffffffffffffp+1023"))
 """As a whole number, with which any whole number and any float compare; NaN is not at most anything."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -118,8 +115,10 @@ def _read_scalar(hint: Any, value: Any, path: str) -> Any:  # noqa: ANN401
         raise TypeError(f"{path}: settings of type {hint} cannot be read")
     is_number = isinstance(value, int | float) and not isinstance(value, bool)  # Python counts True as 1
     if hint is float and is_number and abs(value) <= _LARGEST_FLOAT:
+        check_magnitude(path, float(value))
         return float(value)
-    if hint is int and is_number and isinstance(value, int) and abs(value) <= _LARGEST_INT:
+    if hint is int and is_number and isinstance(value, int):
+        check_magnitude(path, value)
         return value
     if hint in (str, bool, types.NoneType) and isinstance(value, hint):
         return value

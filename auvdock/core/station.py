@@ -14,6 +14,9 @@ from auvdock.core.strict import load_toml
 
 __all__ = ["ConicalStationCfg", "FunnelCfg", "LatchCfg", "conical_layout", "load_conical_station"]
 
+_MOST_LIGHTS = 64
+"""On the rim: from metres away, more are one bright ring, and every frame works on each of them."""
+
 
 @dataclass(frozen=True)
 class FunnelCfg:
@@ -99,7 +102,7 @@ class ConicalStationCfg:
         check_above("depth_m", self.depth_m, above_m, remedy)
         remedy = f"more than {below_m:g} m, so far does the station reach below its mouth's centre"
         check_above("floor_below_m", self.floor_below_m, below_m, remedy)
-        check_range("array_count", self.array_count, 0, math.inf, "a number of 0 or more lights")
+        check_range("array_count", self.array_count, 0, _MOST_LIGHTS, f"a number of 0 to {_MOST_LIGHTS} lights")
         check_range("array_beam_angle_deg", self.array_beam_angle_deg, 0.5, 360.0, "a full angle of 0.5 to 360 degrees")
         check_range("array_tilt_deg", self.array_tilt_deg, -90.0, 90.0, "a tilt of -90 to 90 degrees")
         check_above("array_power_w", self.array_power_w, 0.0, "a power above 0 W")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import tomllib
 import typing
 from collections.abc import Mapping
@@ -12,7 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from auvdock.core.errors import ConfigError, located
-from auvdock.core.reader import FINITE, from_mapping, hints_of, known_table, read_value
+from auvdock.core.magnitudes import check_magnitude
+from auvdock.core.reader import from_mapping, hints_of, known_table, read_value
 
 __all__ = [
     "from_mapping",
@@ -79,7 +79,7 @@ def recheck(value: T, prefix: str = "") -> T:
     """The same dataclasses made anew from within, so that each checks its fields; for those made without.
 
     Raises:
-        ConfigError: a field that is refused, or a number that is not finite.
+        ConfigError: a field that is refused, or a number that is not finite or too great (`check_magnitude`).
     """
     if not dataclasses.is_dataclass(value) or isinstance(value, type):
         raise TypeError("recheck needs a dataclass instance")
@@ -125,6 +125,6 @@ def _rechecked(value: Any, path: str) -> Any:  # noqa: ANN401
     if isinstance(value, tuple):
         items = typing.cast(tuple[Any, ...], value)
         return tuple(_rechecked(item, f"{path}[{index}]") for index, item in enumerate(items))
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ConfigError(path, value, FINITE)
+    if isinstance(value, int | float) and not isinstance(value, bool):  # Python counts True as 1
+        check_magnitude(path, value)
     return value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from auvdock.controllers.named import make_named_pilot
+from auvdock.controllers.named import find_pilot, make_named_pilot
 from auvdock.controllers.pilot import ConicalPilot, Pilot
 from auvdock.controllers.rotating.pilot import RotatingPilot
 from auvdock.core.contracts import Percept
@@ -42,6 +42,8 @@ class ConicalTask:
         self.detector = cfg.perception.detector
         with located("perception."):
             self._detector = make_station_detector(self.detector, self.station)
+        with located("control."):
+            find_pilot(cfg.control.controller)  # before the world, whose loops may have to be compiled
         self.world = DockingWorld(cfg.world, self.detector)
         self._perception = BeaconPerception(
             cfg.perception,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from auvdock.controllers.landing.pilot import LandingPilot
-from auvdock.controllers.named import PilotFactory, make_named_pilot
+from auvdock.controllers.named import PilotFactory, find_pilot, make_named_pilot
 from auvdock.core.contracts import Percept
 from auvdock.core.errors import located
 from auvdock.envs.landing_world import LandingWorld
@@ -47,6 +47,8 @@ class LandingTask:
         with located("perception."):
             self._detector = make_detector(self.detector)
             self._tag_detector = make_tag_detector(cfg.perception.tag_detector, (self.station.tag.tag_id,))
+        with located("control."):
+            find_pilot(cfg.control.controller)  # before the world, whose loops may have to be compiled
         self.world = LandingWorld(cfg.world, self.detector, cfg.perception.tag_detector)
         vehicle, camera = self.world.simulator.vehicle, self.world.camera
         self._perception = LandingPerception(cfg.perception, camera, self.station)

@@ -39,8 +39,8 @@ class ExposureCfg:
             raise ConfigError("min_s", self.min_s, "a time above 0 s, at most max_s")
         if not self.initial_s > 0.0:
             raise ConfigError("initial_s", self.initial_s, "a time above 0 s")
-        if not self.max_gain >= 1.0:
-            raise ConfigError("max_gain", self.max_gain, "a gain of 1 or more")
+        if not 1.0 <= self.max_gain <= 1000.0:
+            raise ConfigError("max_gain", self.max_gain, "a gain of 1 to 1000, which is 60 dB")
         if not 1.0 < self.max_step <= 4.0:
             raise ConfigError("max_step", self.max_step, "a factor above 1 and up to 4")
         if not 0.0 <= self.dead_band < 1.0:
@@ -77,12 +77,17 @@ class ImagingCfg:
 
     def __post_init__(self) -> None:
         """Refuse what no camera can be."""
-        for name in ("sensor_width_m", "f_number", "lens_sigma_px", "full_well_e"):
+        if not 1.0 <= self.full_well_e <= 1e7:
+            raise ConfigError("full_well_e", self.full_well_e, "1 to 10,000,000 electrons")
+        if not 0.0 <= self.read_noise_e <= 1000.0:
+            raise ConfigError("read_noise_e", self.read_noise_e, "0 to 1000 electrons")
+        if not 0.1 <= self.f_number <= 1000.0:
+            raise ConfigError("f_number", self.f_number, "a number of 0.1 to 1000")
+        for name in ("sensor_width_m", "lens_sigma_px"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ConfigError(name, getattr(self, name), "a number above 0")
-        for name in ("lamp_radius_m", "read_noise_e"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(name, getattr(self, name), "0 or more")
+        if not (math.isfinite(self.lamp_radius_m) and self.lamp_radius_m >= 0.0):
+            raise ConfigError("lamp_radius_m", self.lamp_radius_m, "0 or more")
         for name in ("lens_transmission", "lamp_spill"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ConfigError(name, getattr(self, name), "a fraction of 0 to 1")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +15,9 @@ from auvdock.core.strict import load_toml, names_file
 from auvdock.optics.bands import BANDS_NM, interpolate_bands
 
 __all__ = ["WaterCfg", "load_water", "with_attenuation"]
+
+_GREATEST_PER_M = 100.0
+"""Of absorption and scattering: no light is left after 10 cm; the muddiest estuaries have some 50 1/m."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,8 @@ class WaterCfg:
     def __post_init__(self) -> None:
         """Refuse what no water can be."""
         for name in ("absorption_per_m", "scattering_per_m"):
-            if not all(math.isfinite(value) and value >= 0.0 for value in getattr(self, name)):
-                raise ConfigError(name, getattr(self, name), "three coefficients of 0 1/m or more")
+            if not all(0.0 <= value <= _GREATEST_PER_M for value in getattr(self, name)):
+                raise ConfigError(name, getattr(self, name), f"three coefficients of 0 to {_GREATEST_PER_M:g} 1/m")
         if not 0.001 <= self.scattering_angle_rad <= 0.5:
             raise ConfigError("scattering_angle_rad", self.scattering_angle_rad, "an angle of 0.001 to 0.5 rad")
         if not 0.0 <= self.backscatter_ratio <= 0.5:
@@ -103,18 +105,19 @@ def with_attenuation(water: WaterCfg, c_450: float) -> WaterCfg:
     Turbidity moves scattering and leaves absorption alone. A water without scattering gets b ∝ 1/λ.
 
     Raises:
-        ConfigError: not finite, or below the water's absorption at 450 nm.
+        ConfigError: below the water's absorption at 450 nm, or more in some band than any water has.
     """
     a_450, b_450 = water.absorption_per_m[0], water.scattering_per_m[0]
-    if not math.isfinite(c_450) or c_450 < a_450:
-        raise ConfigError(
-            "attenuation_per_m",
-            c_450,
-            f"a finite attenuation of at least {a_450:g} 1/m, the absorption of {water.name!r} at 450 nm",
-        )
     b_new = c_450 - a_450
     if b_450 > 0.0:
         blue, green, red = (b * b_new / b_450 for b in water.scattering_per_m)
     else:
         blue, green, red = (b_new * BANDS_NM[0] / nm for nm in BANDS_NM)
+    if not (b_new >= 0.0 and max(blue, green, red) <= _GREATEST_PER_M):
+        raise ConfigError(
+            "attenuation_per_m",
+            c_450,
+            f"a finite attenuation of at least {a_450:g} 1/m, the absorption of {water.name!r} at 450 nm, and of less "
+            f"than {_GREATEST_PER_M:g} 1/m",
+        )
     return dataclasses.replace(water, scattering_per_m=(blue, green, red))

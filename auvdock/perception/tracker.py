@@ -65,9 +65,10 @@ class TrackerCfg:
         for name in ("pixel_sigma_px", "acceleration_px_s2", "initial_speed_px_s", "gate_sigmas"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(name, getattr(self, name), "a value above 0")
-        for name in ("confirm_hits", "window_frames"):
-            if getattr(self, name) < 1:
-                raise ConfigError(name, getattr(self, name), "1 or more")
+        if self.confirm_hits < 1:
+            raise ConfigError("confirm_hits", self.confirm_hits, "1 or more")
+        if not 1 <= self.window_frames <= 1000:
+            raise ConfigError("window_frames", self.window_frames, "1 to 1000 frames")
         for name in ("max_predicted_frames", "max_tentative_frames"):
             if getattr(self, name) < 0:
                 raise ConfigError(name, getattr(self, name), "0 or more")

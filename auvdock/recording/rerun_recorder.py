@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from auvdock.episode.result import EpisodeResult
     from auvdock.episode.trace import EpisodeSetup, Tick
 
-__all__ = ["RecordingWarning", "RerunRecorder"]
+__all__ = ["RecordingWarning", "RerunRecorder", "check_writable"]
 
 _BATCH_ROWS = 256
 _BATCH_WALL_S = 0.5
@@ -61,7 +61,7 @@ class RerunRecorder:
             raise ConfigError("image_every", image_every, "1 or more, to record every n-th frame")
         if not 1 <= jpeg_quality <= 100:
             raise ConfigError("jpeg_quality", jpeg_quality, "1 to 100")
-        _check_writable(path)
+        check_writable(path)
         self.path = path
         self.failure: str | None = None
         """Why the last recording is incomplete; None if it is whole, or was not begun."""
@@ -162,8 +162,12 @@ def _log_document(stream: rr.RecordingStream, text: str) -> None:
     stream.log(paths.SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True, strict=True)
 
 
-def _check_writable(path: Path) -> None:
-    """Raise ConfigError unless `path` can be opened for writing; leaves the folder as it was."""
+def check_writable(path: Path) -> None:
+    """Refuse a path that cannot be opened for writing; leaves the folder as it was.
+
+    Raises:
+        ConfigError: such a path.
+    """
     if path.suffix != ".rrd":
         raise ConfigError("record", str(path), "a file name that ends in .rrd")
     try:

@@ -116,9 +116,23 @@ def test_dock_alone_tells_what_it_wants(capsys):
         (["--episodes", "0"], "episodes", "1 or more"),
         (["--workers", "0"], "workers", "1 or more"),
         (["--seed", "-1"], "seed", "0 or more"),
-        (["--until-ci", "0.7"], "until_ci", "0.5"),
+        (["--until-ci", "0.7"], "until-ci", "0.5"),
+        (["--episode-limit", "0"], "episode-limit", "above 0 s"),
+        (["--episode-limit", "1e300"], "episode-limit", "at most"),
         (["--campaign", "no-such-file.toml"], "file", "readable"),
         (["--detector", "oracle"], "detector", "threshold"),
+        (["--detector", "threshold,oracle"], "detector", "threshold"),
+        (["--controller", "own,oracle"], "controller", "own"),
+        (["--water", "pool,champagne"], "water", "clear"),
+        (["--water", "clear,pool", "--attenuation", "0.04,0.2"], "attenuation", "0.05"),
+        (["--attenuation", "0.2:1e308"], "attenuation", "at most"),
+        (["--axis", "world.station.array_count=4,65"], "array_count", "0 to 64"),
+        (["--axis", "world.start.lateral_m=0:1:999999999"], "lateral_m", "up to 1000"),
+        (["--world.station.depth-m", "1e20"], "depth_m", "11000"),
+        (["--episodes", "9" * 20], "episodes", "64 bits"),
+        (["--episodes", "1000001"], "episodes", "1000000"),
+        (["--seed", "9" * 20], "seed", "64 bits"),
+        (["--workers", "100000"], "workers", "up to"),
     ],
 )
 def test_input_that_cannot_be_used_is_named_in_one_line(tmp_path, capsys, words, field, remedy):
@@ -132,6 +146,7 @@ def test_input_that_cannot_be_used_is_named_in_one_line(tmp_path, capsys, words,
     assert len(printed.err.splitlines()) == 1
     assert field in printed.err
     assert remedy in printed.err
+    assert not (tmp_path / "out").exists()
 
 
 def refusal_of_ray(tmp_path, capsys):

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from auvdock.cli.main import main
+from auvdock.envs import vehicle_world
 
 
 def run(*words, **more):
@@ -39,10 +40,22 @@ BEACON = (
         (["--seed", "-1"], "seed", "0 or more"),
         (["--world.camera.width-px", "0"], "width_px", "16"),
         (["--record", "/nonexistent/folder/run.rrd"], "record", "folder"),
+        (["--controller", "oracle"], "controller", "own"),
+        (["--seed", "9" * 20], "seed", "64 bits"),
+        (["--attenuation", "1e308"], "attenuation", "at most 100 1/m"),
+        (["--world.start.max-range-m", "1e20"], "world.start.max_range_m", "at most 11000 m"),
+        (["--world.station.depth-m", "1e20"], "world.station.depth_m", "at most 11000 m"),
+        (["--world.station.depth-m", "inf"], "world.station.depth_m", "finite"),
+        (["--world.station.array-count", "9" * 20], "world.station.array_count", "64 bits"),
+        (["--world.station.array-count", "65"], "world.station.array_count", "0 to 64"),
         (["--config", "/nonexistent.toml"], "file", "readable"),
     ],
 )
-def test_bad_flags(words, field, remedy, capsys):
+def test_bad_flags(words, field, remedy, capsys, monkeypatch):
+    def compile_loops(*anything):
+        pytest.fail("a simulator is made, for which a minute is compiled, before the input is refused")
+
+    monkeypatch.setattr(vehicle_world, "Simulator", compile_loops)
     code = main(["dock", "conical", "--fidelity", "beacons", *words])
     captured = capsys.readouterr()
     assert code == 2

@@ -6,11 +6,13 @@ import errno
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from auvdock.cli.exit_codes import with_unwritten
 from auvdock.cli.main import main
+from auvdock.cli.recorded import run_recorded
 from auvdock.cli.saving import Saving
 from auvdock.core.errors import ConfigError
 from auvdock.recording.file import RecordingFile
@@ -64,6 +66,34 @@ def test_failures_of_a_campaign(tmp_path, capsys, monkeypatch, request):
     monkeypatch.undo()
     assert main(["report", str(out), "--record-failures", "2"]) == 0
     assert len(list(out.glob("**/*.rrd"))) == 2
+
+
+class Interrupted:
+    """Flies nothing; writes part of the recording, as an episode does, and is interrupted or not."""
+
+    def __init__(self, error: type[BaseException] | None) -> None:
+        self.error = error
+
+    def run(self, seed, observers):
+        observers[0].path.write_bytes(b"part")
+        if self.error is not None:
+            raise self.error
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_what_is_interrupted_is_never_taken_for_whole(error, tmp_path):
+    path, saving = tmp_path / "episode.rrd", Saving()
+    whole: Any = Interrupted(None)
+    part: Any = Interrupted(error)
+    with pytest.raises(error):
+        run_recorded(part, 0, path, saving, whole=True)
+    assert list(tmp_path.iterdir()) == []
+    run_recorded(whole, 0, path, saving, whole=True)
+    assert list(tmp_path.iterdir()) == [path]
+    assert saving.written == [str(path)]
+    with pytest.raises(error):  # of a docking as much as was flown is kept
+        run_recorded(part, 0, tmp_path / "docking.rrd", saving)
+    assert (tmp_path / "docking.rrd").exists()
 
 
 @pytest.mark.parametrize(("code", "told"), [(0, 74), (1, 75), (2, 2), (70, 70), (130, 130)])

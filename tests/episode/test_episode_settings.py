@@ -199,6 +199,25 @@ def test_each_check_names_the_setting_that_it_refuses(station: str):
     assert len([path for path in leaves if path in refused]) > 0.8 * len(leaves)
 
 
+def with_numbers(hint: Any) -> bool:
+    """Whether a setting is a number, may be one, or is a list of numbers."""
+    return hint in (int, float) or any(map(with_numbers, get_args(hint)))
+
+
+@pytest.mark.parametrize("huge", [1e20, -1e308, 10**20], ids=repr)
+@pytest.mark.parametrize("station", STATIONS)
+def test_no_number_is_beyond_physics(station: str, huge: float):
+    cfg, tried = BASES[station], 0
+    for path, hint in PATHS[station].items():
+        if with_numbers(hint) and not dataclasses.is_dataclass(hint):
+            size = len(value_at(cfg, path) or (0,) * 3) if "tuple" in str(hint) else 0
+            error = refusal(cfg, path, [huge] * size if size else huge)
+            assert error is not None, path
+            assert error.field.startswith(path)
+            tried += 1
+    assert tried > 100
+
+
 @pytest.mark.parametrize("station", ["conical", "landing"])
 def test_names_that_do_not_exist_are_refused_where_the_world_is_made(station: str):
     from auvdock.episode.runner import EpisodeRunner

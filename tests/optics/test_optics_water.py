@@ -80,6 +80,16 @@ def test_impossible_attenuation_is_refused(c_450):
     assert "0.05" in caught.value.remedy
 
 
+@pytest.mark.parametrize("c_450", [101.0, 1e20, 1e308])
+def test_no_water_is_darker_than_mud(c_450):
+    with pytest.raises(ConfigError) as caught:
+        with_attenuation(load_water("pool"), c_450)
+    assert caught.value.field == "attenuation_per_m"
+    with pytest.raises(ConfigError) as caught:
+        WaterCfg("ink", "test", (0.02, c_450, 0.28), (0.0, 0.0, 0.0))
+    assert caught.value.field == "absorption_per_m"
+
+
 def test_unknown_water_names_those_that_exist():
     with pytest.raises(ConfigError, match="lake"):
         load_water("soup")
