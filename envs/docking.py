@@ -23,7 +23,7 @@ The limits in newtons and radians stand in `assets/vehicles/remus_hybrid.toml`.
 ## Observation space
 Chosen by `observation`:
 
-All boxes are float64 and bounded by ±1000, which nothing reaches before the episode ends as `carried_off`.
+All boxes are float64 and bounded by ±20,000, more than the greatest depth or start range that a world may have.
 
 `"state"` (default): `Box` of shape (19,), the true state. Privileged: no real vehicle has it.
 

@@ -26,7 +26,7 @@ For `remus_hybrid` they are those of `auvdock/ConicalDocking-v0`, n = 7. Limits,
 ## Observation space
 Chosen by `observation`. "Seat" is the middle of the round that comes to rest in the guides, of the hull or of a keel.
 
-All boxes are float64 and bounded by ±1000, which nothing reaches before the episode ends as `carried_off`.
+All boxes are float64 and bounded by ±20,000, more than the greatest depth or start range that a world may have.
 
 `"state"` (default): `Box` of shape (19,), the true state. Privileged: no real vehicle has it.
 

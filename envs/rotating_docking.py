@@ -22,7 +22,7 @@ at which the beam sweeps past tells its azimuth: A = 360° · 0.5 /s · t, with 
 | 6 | elevator | -1 | 1 | elevator | angle, rad |
 
 ## Observation space
-Chosen by `observation`; boxes are float64 and bounded by ±1000.
+Chosen by `observation`; boxes are float64 and bounded by ±20,000.
 
 `"state"` (default): `Box` of shape (19,), the true state, as in `auvdock/ConicalDocking-v0`. Privileged.
 

@@ -22,7 +22,7 @@ from auvdock.sim.truth import Truth
 
 __all__ = ["BOUND", "Observation", "VehicleEnv", "box", "proprioception_vector"]
 
-BOUND = 1000.0
+BOUND = 20_000.0
 """Bound of every observed number, in its own unit."""
 
 Observation = Array | dict[str, Any]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -208,3 +209,11 @@ def test_a_picture_before_the_first_frame_came_through_takes_none() -> None:
 
 def leaves(item: Any) -> list[Any]:
     return [leaf for key in sorted(item) for leaf in leaves(item[key])] if isinstance(item, dict) else [item]
+
+
+def test_what_is_observed_in_the_deep_lies_in_its_space():
+    """11,000 m is the greatest depth that a station may have."""
+    cfg = WorldCfg(fidelity="beacons", station=replace(WorldCfg().station, depth_m=10_900.0))
+    env = DockingEnv(cfg, observation="pose")
+    observation, _ = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
