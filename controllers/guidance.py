@@ -14,9 +14,9 @@ from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.linear_model import hydrodynamic_wrench
 from auvdock.controllers.modes import ModeCfg
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.numeric.compiled import compiled
 
 __all__ = [
     "GuidanceCfg",

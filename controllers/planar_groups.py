@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["add_planar", "beyond_dead_band", "least_planar", "longest", "planar_groups"]
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["ACCEPTED", "LEFT_OUT", "REFUSED", "relative_period"]
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Proprioception
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["Senses", "Vector", "cross", "read_senses"]
 

@@ -18,9 +18,9 @@ from rich.text import Text
 
 from auvdock.cli.console import output
 from auvdock.cli.parsing import parse
-from auvdock.core.compiled import cache_folders
 from auvdock.core.errors import AuvdockError
-from auvdock.core.kept_code import examine_folder
+from auvdock.numeric.compiled import cache_folders
+from auvdock.numeric.kept_code import examine_folder
 
 __all__ = ["Check", "Doctor", "examine", "run"]
 

@@ -100,7 +100,7 @@ def _answer(words: list[str]) -> int:
         run: Callable[[Sequence[str], str], int] = getattr(import_module(module), function)
         relax_collector()
         _find_modules_here()
-        from auvdock.core.compiled import compiling  # half a second, not for a usage message
+        from auvdock.numeric.compiled import compiling  # half a second, not for a usage message
 
         with told_once(), nullcontext() if "--json" in words else compiling(_tell_of_compiling):
             code = run(words[len(command) :], "auvdock " + " ".join(command))

@@ -4,15 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from auvdock.numeric.arrays import Array, BoolArray, Image, IntArray
 
 __all__ = ["Array", "BoolArray", "Image", "IntArray", "ShapeError", "check_shape"]
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
-Image = NDArray[np.uint8]
 
 
 class ShapeError(ValueError):

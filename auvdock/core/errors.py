@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import contextmanager
 
+from auvdock.numeric.warning import AuvdockWarning
+
 __all__ = ["AuvdockError", "AuvdockWarning", "ConfigError", "GraphicsError", "located"]
 
 
@@ -39,10 +41,6 @@ class ConfigError(AuvdockError):
 
 class GraphicsError(AuvdockError):
     """No OpenGL context could be had for offscreen rendering."""
-
-
-class AuvdockWarning(UserWarning):
-    """What works all the same but may want to be put right; the command line prints it on one line."""
 
 
 @contextmanager

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
 from auvdock.core.transforms import cross
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.beam_pieces import BeamPieces, PieceLight
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet

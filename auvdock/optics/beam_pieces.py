@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.halo import halo_table
 from auvdock.optics.rotating_light import Beam
 from auvdock.optics.water import WaterCfg

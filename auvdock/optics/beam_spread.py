@@ -24,7 +24,7 @@ import numpy as np
 from scipy.special import j0, j1
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.halo import wells_transfer
 
 __all__ = ["BeamSpread", "beam_spread"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["add_beamed", "add_spilled"]
 

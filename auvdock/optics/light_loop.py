@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 __all__ = [
     "areas",

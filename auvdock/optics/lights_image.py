@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.halo import halo_table
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet, Received

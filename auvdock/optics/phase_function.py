@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["fournier_forand", "wells_phase", "wide_angle_phase"]
 

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, Image
-from auvdock.core.compiled import compiled
 from auvdock.core.response import SATURATED_CODE
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.light_loop import codes, contrast, noise_dn
 from auvdock.optics.settings import ImagingCfg
 

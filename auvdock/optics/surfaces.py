@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, BoolArray
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.gl import StaticRenderer
 from auvdock.optics.illumination import LAMP_M2, Illumination
 from auvdock.optics.lamp_light import add_spilled

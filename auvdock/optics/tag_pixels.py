@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.tag_pattern import CELLS
 
 __all__ = ["add_tag"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from auvdock.core.arrays import Image, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["components", "peaked_components"]
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray, Image, IntArray
-from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Frame
 from auvdock.core.response import SATURATED_CODE
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["DISC_RAD", "spot_flux"]
 

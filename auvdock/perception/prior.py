@@ -8,9 +8,9 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
-from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Bearing, Proprioception
 from auvdock.core.transforms import rotation_from_euler_zyx, wrap_angle
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["AttitudePrior", "FacingHeading"]
 

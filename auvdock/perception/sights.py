@@ -9,7 +9,7 @@ import numpy as np
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["CENTRE", "ENTRANCE", "FOLLOWED", "LONG_RANGE", "RANGE", "RAY", "SCORE", "find_sights", "sight_terms"]
 

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from auvdock.core.arrays import Array, Image, IntArray
-from auvdock.core.compiled import compiled
 from auvdock.core.contracts import BLUE, RED, Detections, RegionOfInterest
+from auvdock.numeric.compiled import compiled
 
 __all__ = [
     "CELL_PX",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 __all__ = [
     "BEACON_ID",

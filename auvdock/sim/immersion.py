@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
 from auvdock.core.errors import ConfigError
 from auvdock.core.marine import flip_vector
 from auvdock.core.vehicle import HullPartCfg, VehicleCfg
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["Immersion", "immerse"]
 

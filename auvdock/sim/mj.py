@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from auvdock.core.compiled import external
+from auvdock.numeric.compiled import external
 
 __all__ = ["GL_REFUSAL", "MjData", "MjModel", "addresses", "c_function", "mujoco"]
 

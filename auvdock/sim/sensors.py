@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import ConfigError
+from auvdock.numeric.compiled import compiled
 
 __all__ = ["SensorCfg", "Sensors"]
 

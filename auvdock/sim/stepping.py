@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 from auvdock.sim.mj import c_function
 
 __all__ = [

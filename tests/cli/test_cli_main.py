@@ -11,8 +11,8 @@ import pytest
 
 from auvdock.cli import doctor
 from auvdock.cli.main import COMMANDS, main
-from auvdock.core.compiled import compiled
-from auvdock.core.kept_code import FolderState, KeptCodeWarning
+from auvdock.numeric.compiled import compiled
+from auvdock.numeric.kept_code import FolderState, KeptCodeWarning
 from auvdock.optics import gl_driver
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.photons.phase import PhaseFunction
 
 __all__ = ["EXCESS_EDGES", "Tally", "shoot", "turn_of"]

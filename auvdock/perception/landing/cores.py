@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 
 from auvdock.core.arrays import Array, Image, IntArray
-from auvdock.core.compiled import compiled
 from auvdock.core.contracts import BLUE, RED, Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
+from auvdock.numeric.compiled import compiled
 from auvdock.perception.components import peaked_components
 from auvdock.perception.spots import inside, mean_channel, noise_sigma
 

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from auvdock.core import kept_code
-from auvdock.core.compiled import cache_folders, compiling
-from auvdock.core.kept_code import KeptCodeWarning, examine_folder
+from auvdock.numeric import kept_code
+from auvdock.numeric.compiled import cache_folders, compiling
+from auvdock.numeric.kept_code import KeptCodeWarning, examine_folder
 
 SOURCE = """
-from auvdock.core.compiled import compiled
+from auvdock.numeric.compiled import compiled
 
 @compiled
 def raised(x):

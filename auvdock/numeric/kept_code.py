@@ -8,7 +8,8 @@ There is one file for each function, types of its arguments and kind of processo
 
     SHA-256 of all that follows (32 bytes) | stamp (32 bytes) | Numba's pickled result
 
-The stamp changes with the module's file, the function's byte code, Numba and this format. A file takes its place as a
+The stamp changes with the module's file, with any file of this room, from which all compiled functions may take
+functions and constants, with the function's byte code, with Numba and with this format. A file takes its place as a
 whole, so that processes can write it at the same time.
 """
 
@@ -21,14 +22,15 @@ import sys
 import tempfile
 import uuid
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from auvdock.core.errors import AuvdockWarning
+from auvdock.numeric.warning import AuvdockWarning
 
 __all__ = ["FolderState", "KeptCode", "KeptCodeWarning", "examine_folder"]
 
@@ -39,7 +41,8 @@ _result: Any = import_module("numba.core.compiler").CompileResult
 _dumps: Callable[[object], bytes] = import_module("numba.core.serialize").dumps
 _user_dirs: Any = import_module("numba.misc.appdirs").AppDirs
 
-_FORMAT = b"auvdock 1"
+_FORMAT = b"auvdock 2"
+_ROOM = Path(__file__).resolve().parent
 _HASH_BYTES = 32
 _SUFFIX = ".nbc"
 _TAG = sys.implementation.cache_tag
@@ -60,13 +63,13 @@ class KeptCode(_caching._Cache):
             source: the file in which it stands.
 
         Raises:
-            OSError: that file cannot be read.
+            OSError: that file or one of this room cannot be read.
         """
         self._function = function
         self._source = source
         self._enabled = True
-        parts = (_FORMAT, _numba.__version__.encode(), source.read_bytes(), function.__code__.co_code)
-        self._stamp = hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).digest()
+        parts = (_FORMAT, _numba.__version__.encode(), source.read_bytes(), function.__code__.co_code, _hash_of(_ROOM))
+        self._stamp = _hash(parts)
 
     @property
     def cache_path(self) -> str:
@@ -147,6 +150,20 @@ class KeptCode(_caching._Cache):
         cells = tuple(cell.cell_contents for cell in self._function.__closure__ or ())
         key = repr((str(sig), codegen.magic_tuple(), _dumps(cells) if cells else b""))
         return f"{self._base()}-{hashlib.sha256(key.encode()).hexdigest()[:16]}{_SUFFIX}"
+
+
+@lru_cache(maxsize=1)
+def _hash_of(room: Path) -> bytes:
+    """Hash of a folder's Python files, their names included; read once, as a process loads them once."""
+    parts: list[bytes] = []
+    for path in sorted(room.glob("*.py")):
+        parts += [path.name.encode(), path.read_bytes()]
+    return _hash(parts)
+
+
+def _hash(parts: Iterable[bytes]) -> bytes:
+    """Hash that tells where one part ends and the next begins."""
+    return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).digest()
 
 
 def _folders(source: Path) -> tuple[Path, ...]:

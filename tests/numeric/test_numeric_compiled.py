@@ -1,6 +1,6 @@
 import numpy as np
 
-from auvdock.core.compiled import cache_folders, compiled, compiling
+from auvdock.numeric.compiled import cache_folders, compiled, compiling
 
 
 def count_above(values, level):

@@ -1,11 +1,12 @@
 """Loops over pixels, lights and small matrices, compiled by Numba where NumPy would take dozens of calls.
 
 A compiled function is plain Python. It is compiled once, on its first call with arguments of its types, and kept on
-disk beside its module, or in the user's cache folder, or not at all where neither can be written (`core.kept_code`).
+disk beside its module, or in the user's cache folder, or not at all where neither can be written (`numeric.kept_code`).
 Arithmetic keeps to IEEE 754, so the same machine gives the same bits each time.
 
-Kept code is left when the file of its function changes, but not when a function that it calls from another file does:
-hence a compiled function calls only compiled functions of its own file.
+Kept code is left when the file of its function changes or any of this room, but not for another: hence a compiled
+function names functions and constants of its own file and of this room only, and no constant of its file is made from
+another's.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from auvdock.core.kept_code import KeptCode
+from auvdock.numeric.kept_code import KeptCode
 
 __all__ = ["cache_folders", "compiled", "compiling", "external"]
 
