@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.motion import GROUND, LEVEL, PITCH, RATE, ROLL, WATER
+from auvdock.numeric.rotations import back, headed
+from auvdock.numeric.scalars import cross, limited, within_pi
 
 __all__ = ["body_wrench", "near", "pid_step"]
 
@@ -69,13 +70,9 @@ def body_wrench(
         hull: (22, 3) linear, quadratic and lift damping, six rows each, by the velocity's column; added mass of the
             velocity, three rows; mass with added mass of surge, sway and heave.
     """
-    level, cosine, sine = motion[11:].reshape(3, 3), math.cos(yaw_rad), math.sin(yaw_rad)
-    world = np.empty((3, 3))
-    for i in range(3):
-        world[0, i] = cosine * level[0, i] - sine * level[1, i]
-        world[1, i] = sine * level[0, i] + cosine * level[1, i]
-        world[2, i] = level[2, i]
-    ground, water = motion[5:8], motion[8:11]
+    level = motion[LEVEL:].reshape(3, 3)
+    world = headed(yaw_rad, level)
+    ground, water = motion[GROUND:WATER], motion[WATER:LEVEL]
     measured = water if through_water else ground
     references, current = memory[:3], memory[3:6]
     # Current: ground minus water velocity, smoothed.
@@ -90,12 +87,12 @@ def body_wrench(
         target = surge_m_s if i == 0 else sway_m_s if i == 1 else heave_m_s
         bound = limits[_SURGE_ACCELERATION] if i == 0 else limits[_SWAY_ACCELERATION]
         now = level[i, 0] * measured[0] + level[i, 1] * measured[1] + level[i, 2] * measured[2]
-        moved = state[i] + _clip(target - state[i], bound * dt_s)
-        references[i] = now + _clip(moved - now, limits[_MAX_SPEED_ERROR])
-        inertia[i] = hull[21, i] * _clip((references[i] - state[i]) / dt_s, bound)
-    wanted, drift, push, weight = _back(level, references), _back(world, current), _back(level, inertia), np.zeros(3)
+        moved = state[i] + limited(target - state[i], bound * dt_s)
+        references[i] = now + limited(moved - now, limits[_MAX_SPEED_ERROR])
+        inertia[i] = hull[21, i] * limited((references[i] - state[i]) / dt_s, bound)
+    wanted, drift, push, weight = back(level, references), back(world, current), back(level, inertia), np.zeros(3)
     weight[2] = limits[_NET_WEIGHT]
-    lift = _back(level, weight)
+    lift = back(level, weight)
     if through_water:
         drift = np.zeros(3)
     balance = _balance(wanted[0] - drift[0], wanted[1] - drift[1], wanted[2] - drift[2], hull)
@@ -107,12 +104,12 @@ def body_wrench(
             feed += lift[axis]
             feed += push[axis]
         elif axis == 3:
-            error, rate = _clip(_within_pi(pitch_rad - motion[1]), limits[_MAX_ERROR]), motion[3]
+            error, rate = limited(within_pi(pitch_rad - motion[PITCH]), limits[_MAX_ERROR]), motion[RATE + 1]
         elif axis == 4:
-            error = _clip(_within_pi(heading_rad - yaw_rad), limits[_MAX_ERROR])
-            rate = motion[4] - turn_rad_s
+            error = limited(within_pi(heading_rad - yaw_rad), limits[_MAX_ERROR])
+            rate = motion[RATE + 2] - turn_rad_s
         else:
-            error, rate = _clip(roll_rad - motion[0], limits[_MAX_ERROR]), motion[2]
+            error, rate = limited(roll_rad - motion[ROLL], limits[_MAX_ERROR]), motion[RATE]
         kp, ki, kd, limit = loops[axis, 1], loops[axis, 2], loops[axis, 3], loops[axis, 4]
         integral = state[6 + axis]
         output, after = pid_step(kp, ki, kd, integral, error, rate, feed, limit, dt_s)
@@ -162,7 +159,7 @@ def pid_step(
     Returns:
         The output and the new integral.
     """
-    candidate = _clip(integral + ki * error * dt_s, limit)
+    candidate = limited(integral + ki * error * dt_s, limit)
     wanted = kp * error + candidate + feed_forward - kd * rate
     if wanted > limit:
         return limit, candidate if error < 0.0 else integral
@@ -182,28 +179,7 @@ def _balance(x: float, y: float, z: float, hull: Array) -> Array:
             wrench[row] -= drag * part
     for row in range(3):
         momentum[row] = hull[18 + row, 0] * x + hull[18 + row, 1] * y + hull[18 + row, 2] * z
-    wrench[3] += y * momentum[2] - z * momentum[1]
-    wrench[4] += z * momentum[0] - x * momentum[2]
-    wrench[5] += x * momentum[1] - y * momentum[0]
+    munk = cross(x, y, z, momentum[0], momentum[1], momentum[2])
+    for axis in range(3):
+        wrench[3 + axis] += munk[axis]
     return wrench
-
-
-@compiled
-def _back(rotation: Array, vector: Array) -> Array:
-    """Rᵀ v."""
-    out = np.empty(3)
-    for i in range(3):
-        out[i] = rotation[0, i] * vector[0] + rotation[1, i] * vector[1] + rotation[2, i] * vector[2]
-    return out
-
-
-@compiled
-def _clip(value: float, bound: float) -> float:
-    """Within ± bound."""
-    return bound if value > bound else -bound if value < -bound else value
-
-
-@compiled
-def _within_pi(angle: float) -> float:
-    """An angle brought to within ±π."""
-    return angle - math.tau * np.rint(angle / math.tau)

@@ -17,6 +17,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.scalars import limited
 
 __all__ = [
     "GuidanceCfg",
@@ -274,13 +275,13 @@ def axis_course(
     # Integral action is for what is left on the axis: not for the way there, nor for what the funnel's walls do.
     if distance_m < 0.0 or off_axis_m > law[_CORRIDOR]:
         port_after, up_after = port_integral, up_integral
-    port = _clip(law[_CROSS] * math.sin(port_angle), law[_MAX_CROSS])
-    up = _clip(law[_CROSS] * math.sin(up_angle), law[_MAX_CROSS])
+    port = limited(law[_CROSS] * math.sin(port_angle), law[_MAX_CROSS])
+    up = limited(law[_CROSS] * math.sin(up_angle), law[_MAX_CROSS])
     forward = approach_speed(distance_m, off_axis_m, law)
     if distance_m < law[_MOUTH]:
         forward = law[_TUBE_SPEED] if distance_m < -law[_FUNNEL] else law[_ENTRY_SPEED]
     elif hold:
-        forward = _clip(0.3 * (distance_m - law[_GATE]), 0.2)
+        forward = limited(0.3 * (distance_m - law[_GATE]), 0.2)
     across = abs(current_y_m_s * math.cos(axis_yaw_rad) - current_x_m_s * math.sin(axis_yaw_rad))
     excess = min(1.0, max(0.0, (across - law[_REACH]) / law[_RUSH_EXCESS]))
     if excess > 0.0 and committed:
@@ -306,12 +307,6 @@ def axis_course(
         bearing + view,
     )
     return surge, sway, up, offset, port_after, up_after
-
-
-@compiled
-def _clip(value: float, bound: float) -> float:
-    """Within ± bound."""
-    return bound if value > bound else -bound if value < -bound else value
 
 
 def sway_reach_m_s(vehicle: VehicleCfg, allocator: ThrustAllocator, surge_m_s: float, share: float) -> float:

@@ -10,14 +10,17 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.numeric.cholesky import factorise, forward
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.motion import GROUND, LEVEL, RATE, WATER
+from auvdock.numeric.rotations import headed, sine_axis
+from auvdock.numeric.scalars import cross, within_pi
 
 __all__ = ["ACCEPTED", "LEFT_OUT", "REFUSED", "relative_period"]
 
 LEFT_OUT, ACCEPTED, REFUSED = 0.0, 1.0, 2.0
 """Verdicts on a measurement: none came or it is not usable; fused; an outlier."""
 
-_TAU = math.tau
 _LEAST_AHEAD = 0.2
 """A direction to a light must point ahead of the camera by so much: z of the unit ray."""
 
@@ -69,11 +72,10 @@ def _reckon(
     estimate: Array, covariance: Array, motion: Array, yaw_rad: float, dt_s: float, mounting: Array, process: Array
 ) -> None:
     """ṗ = R_station_body (v + ω × r_camera), P ← F P Fᵀ + Q."""
-    body, rate, lever = motion[5:8], motion[2:5], mounting[3]
-    ahead = body[0] + (rate[1] * lever[2] - rate[2] * lever[1])
-    port = body[1] + (rate[2] * lever[0] - rate[0] * lever[2])
-    up = body[2] + (rate[0] * lever[1] - rate[1] * lever[0])
-    turned = _station_body(motion, yaw_rad - estimate[3])
+    body, rate, lever = motion[GROUND:WATER], motion[RATE:GROUND], mounting[3]
+    swing = cross(rate[0], rate[1], rate[2], lever[0], lever[1], lever[2])
+    ahead, port, up = body[0] + swing[0], body[1] + swing[1], body[2] + swing[2]
+    turned = headed(yaw_rad - estimate[3], motion[LEVEL:].reshape(3, 3))
     velocity = np.empty(3)
     for i in range(3):
         velocity[i] = turned[i, 0] * ahead + turned[i, 1] * port + turned[i, 2] * up
@@ -110,9 +112,7 @@ def _fuse_pose(
     innovation = np.empty(6)
     for i in range(3):
         innovation[i] = pose[i, 3] - estimate[i]
-    innovation[3] = 0.5 * (e[2, 1] - e[1, 2])
-    innovation[4] = 0.5 * (e[0, 2] - e[2, 0])
-    innovation[5] = 0.5 * (e[1, 0] - e[0, 1])
+    innovation[3], innovation[4], innovation[5] = sine_axis(e)
     distance, shift, rest = _fused(covariance, innovation, predicted[2], noise, law[6], law[:6])
     if not distance < law[7]:
         return REFUSED
@@ -180,26 +180,13 @@ def _shift(estimate: Array, shift: Array) -> None:
     """Move the estimate; ψ_s stays within ±π."""
     for i in range(3):
         estimate[i] += shift[i]
-    axis_yaw = estimate[3] + shift[3]
-    estimate[3] = axis_yaw - _TAU * np.rint(axis_yaw / _TAU)
-
-
-@compiled
-def _station_body(motion: Array, heading_rad: float) -> Array:
-    """R_station_body (3, 3) of a body that heads `heading_rad` in the station frame."""
-    level, cosine, sine = motion[11:].reshape(3, 3), math.cos(heading_rad), math.sin(heading_rad)
-    turned = np.empty((3, 3))
-    for i in range(3):
-        turned[0, i] = cosine * level[0, i] - sine * level[1, i]
-        turned[1, i] = sine * level[0, i] + cosine * level[1, i]
-        turned[2, i] = level[2, i]
-    return turned
+    estimate[3] = within_pi(estimate[3] + shift[3])
 
 
 @compiled
 def _station_camera(motion: Array, heading_rad: float, mounting: Array) -> Array:
     """R_station_camera (3, 3) of a body that heads `heading_rad` in the station frame."""
-    body, camera = _station_body(motion, heading_rad), np.empty((3, 3))
+    body, camera = headed(heading_rad, motion[LEVEL:].reshape(3, 3)), np.empty((3, 3))
     for i in range(3):
         for j in range(3):
             camera[i, j] = body[i, 0] * mounting[0, j] + body[i, 1] * mounting[1, j] + body[i, 2] * mounting[2, j]
@@ -257,44 +244,37 @@ def _fused(
     for i in range(3):
         sensitivity[i, i] = 1.0
         sensitivity[3 + i, 3] = -turn[i]
-    shared = np.zeros((6, 4))
-    for i in range(6):
-        for j in range(4):
+    shared = np.zeros((4, 6))  # P Hᵀ
+    for j in range(4):
+        for i in range(6):
             for k in range(4):
-                shared[i, j] += sensitivity[i, k] * covariance[k, j]
-    # S = L Lᵀ, row by row; beside it L⁻¹ H P and L⁻¹ times the innovation.
-    lower, gain, white = np.zeros((6, 6)), shared.copy(), innovation.copy()
-    distance = 0.0
+                shared[j, i] += sensitivity[i, k] * covariance[k, j]
+    lower = np.empty((6, 6))
     for i in range(6):
         for j in range(i + 1):
             value = inflation * noise[i, j]
             if i == j:
                 value += floor[i]
             for k in range(4):
-                value += shared[i, k] * sensitivity[j, k]
-            for k in range(j):
-                value -= lower[i, k] * lower[j, k]
-            if i > j:
-                lower[i, j] = value / lower[j, j]
-            elif value > 0.0:
-                lower[i, i] = math.sqrt(value)
-            else:
-                return np.inf, np.zeros(4), covariance
-        for k in range(i):
-            white[i] -= lower[i, k] * white[k]
-            for j in range(4):
-                gain[i, j] -= lower[i, k] * gain[k, j]
-        white[i] /= lower[i, i]
-        for j in range(4):
-            gain[i, j] /= lower[i, i]
+                value += shared[k, i] * sensitivity[j, k]
+            lower[i, j] = value
+    if not factorise(lower):
+        return np.inf, np.zeros(4), covariance
+    # With S = L Lᵀ: L⁻¹ times the innovation, and L⁻¹ H P column by column.
+    white, gain = innovation.copy(), shared
+    forward(lower, white)
+    for j in range(4):
+        forward(lower, gain[j])
+    distance = 0.0
+    for i in range(6):
         distance += white[i] * white[i]
     shift, rest = np.zeros(4), covariance.copy()
     for i in range(4):
         for k in range(6):
-            shift[i] += gain[k, i] * white[k]
+            shift[i] += gain[i, k] * white[k]
         for j in range(i + 1):
             value = 0.5 * (covariance[i, j] + covariance[j, i])
             for k in range(6):
-                value -= gain[k, i] * gain[k, j]
+                value -= gain[i, k] * gain[j, k]
             rest[i, j] = rest[j, i] = value
     return distance, shift, rest

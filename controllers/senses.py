@@ -10,10 +10,11 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.motion import GROUND, LEVEL, MOTION, PITCH, RATE, ROLL, WATER
+from auvdock.numeric.rotations import headed, rotation_of_euler_zyx
+from auvdock.numeric.scalars import Vector
 
 __all__ = ["Senses", "Vector", "cross", "read_senses"]
-
-Vector = tuple[float, float, float]
 
 
 class Senses(NamedTuple):
@@ -25,9 +26,7 @@ class Senses(NamedTuple):
         yaw_rad: compass heading of the body, the last of the Euler angles zyx in the world; positive to port.
         contact: bow switch.
         latched: latch reported closed.
-        motion: (20,) what compiled code reads, never written to: roll and pitch (positive pitch is nose down) in rad;
-            p, q, r in rad/s; velocity over ground, then through the water, in m/s, body axes; from index 11 on the
-            rotation from body axes to the level heading frame (ahead, port, up), row by row.
+        motion: (20,) what compiled code reads, never written to; its places are `numeric.motion`.
     """
 
     time_s: float
@@ -40,29 +39,29 @@ class Senses(NamedTuple):
     @property
     def roll_rad(self) -> float:
         """Positive to starboard."""
-        return self.motion.item(0)
+        return self.motion.item(ROLL)
 
     @property
     def pitch_rad(self) -> float:
         """Positive nose down."""
-        return self.motion.item(1)
+        return self.motion.item(PITCH)
 
     @property
     def rate_rad_s(self) -> Vector:
         """p, q, r."""
-        p, q, r = self.motion[2:5].tolist()
+        p, q, r = self.motion[RATE:GROUND].tolist()
         return p, q, r
 
     @property
     def ground_m_s(self) -> Vector:
         """Velocity over ground, body axes."""
-        x, y, z = self.motion[5:8].tolist()
+        x, y, z = self.motion[GROUND:WATER].tolist()
         return x, y, z
 
     @property
     def surge_water_m_s(self) -> float:
         """Forward velocity through the water."""
-        return self.motion.item(8)
+        return self.motion.item(WATER)
 
     def level(self, heading_rad: float, vector: Vector) -> Vector:
         """A vector of body axes in level axes against which the vehicle heads `heading_rad` to port: Rz R v."""
@@ -78,7 +77,7 @@ def read_senses(proprioception: Proprioception) -> Senses:
     depth, time = proprioception.depth_m, proprioception.time_s
     euler = proprioception.euler_zyx_rad
     yaw = float(euler[2])
-    motion = np.empty(20)
+    motion = np.empty(MOTION)
     _motion(
         motion,
         euler,
@@ -98,28 +97,24 @@ def read_senses(proprioception: Proprioception) -> Senses:
 
 @compiled
 def _motion(motion: Array, euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array) -> None:
-    """Write `Senses.motion`, its rotation Ry(pitch) Rx(roll) as `transforms.rotation_from_euler_zyx` without yaw."""
-    motion[0], motion[1] = euler_rad[0], euler_rad[1]
+    """Write `Senses.motion`."""
+    motion[ROLL], motion[PITCH] = euler_rad[0], euler_rad[1]
     for i in range(3):
-        motion[2 + i], motion[5 + i], motion[8 + i] = rate_rad_s[i], ground_m_s[i], water_m_s[i]
-    for i in range(11):
+        motion[RATE + i], motion[GROUND + i], motion[WATER + i] = rate_rad_s[i], ground_m_s[i], water_m_s[i]
+    for i in range(LEVEL):
         if not math.isfinite(motion[i]):
             motion[i] = 0.0
-    cr, sr = math.cos(motion[0]), math.sin(motion[0])
-    cp, sp = math.cos(motion[1]), math.sin(motion[1])
-    motion[11], motion[12], motion[13] = cp, sp * sr, sp * cr
-    motion[14], motion[15], motion[16] = 0.0, cr, -sr
-    motion[17], motion[18], motion[19] = -sp, cp * sr, cp * cr
+    motion[LEVEL:] = rotation_of_euler_zyx(motion[ROLL], motion[PITCH], 0.0).ravel()
 
 
 @compiled
 def _level(motion: Array, heading_rad: float, x: float, y: float, z: float) -> Vector:
     """`Senses.level`, from `Senses.motion`."""
-    m, cosine, sine = motion[11:], math.cos(heading_rad), math.sin(heading_rad)
+    R = headed(heading_rad, motion[LEVEL:].reshape(3, 3))
     return (
-        (cosine * m[0] - sine * m[3]) * x + (cosine * m[1] - sine * m[4]) * y + (cosine * m[2] - sine * m[5]) * z,
-        (sine * m[0] + cosine * m[3]) * x + (sine * m[1] + cosine * m[4]) * y + (sine * m[2] + cosine * m[5]) * z,
-        m[6] * x + m[7] * y + m[8] * z,
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
     )
 
 

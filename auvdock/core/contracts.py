@@ -11,6 +11,7 @@ import numpy as np
 from auvdock.core.arrays import Array, BoolArray, Image, IntArray, check_shape
 from auvdock.core.camera import Camera
 from auvdock.core.response import CameraResponse
+from auvdock.numeric.constants import BLUE, RED
 
 __all__ = [
     "BLUE",
@@ -28,11 +29,6 @@ __all__ = [
     "TagDetection",
     "TrackView",
 ]
-
-BLUE = 0
-"""Class id of a blue light."""
-RED = 1
-"""Class id of a red light."""
 
 _FOUR_VECTORS = ((3,),) * 4
 

@@ -10,10 +10,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 
-__all__ = ["SATURATED_CODE", "CameraResponse"]
-
-SATURATED_CODE = 250
-"""Samples from this code upwards tell no more than that there was at least so much light."""
+__all__ = ["CameraResponse"]
 
 
 @dataclass(frozen=True)

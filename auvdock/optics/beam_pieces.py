@@ -16,6 +16,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import LEAST_EXPONENT
 from auvdock.optics.halo import halo_table
 from auvdock.optics.rotating_light import Beam
 from auvdock.optics.water import WaterCfg
@@ -24,8 +25,6 @@ __all__ = ["BeamPieces", "PieceLight"]
 
 _ANGLES = 512
 _FIRST_RAD = 1e-4
-_LEAST_EXPONENT = -60.0
-"""Of a Gaussian; what is left there is below the rounding of the halo."""
 _FILL = 0.7
 """Standard deviation of a piece's Gaussian over the piece's length."""
 
@@ -117,6 +116,6 @@ def _per_sr(
             halo = table[column] + (place - column) * (table[column + 1] - table[column])
             density[k, i] = scattered[k] * np.exp(halo)
             exponent = angle2[k, i] * (-0.5 / size2)
-            if exponent > _LEAST_EXPONENT:
+            if exponent > LEAST_EXPONENT:
                 density[k, i] += peak * np.exp(exponent)
     return density

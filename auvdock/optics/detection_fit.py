@@ -11,6 +11,7 @@ from scipy.optimize import linear_sum_assignment, minimize
 
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.core.contracts import Detections, Detector
+from auvdock.numeric.constants import HALF_SCORE_SNR
 from auvdock.optics.detection_model import Candidates, DetectionModelCfg, merge_close, veiled_share
 from auvdock.optics.flash import FlashOptics
 from auvdock.optics.imaging import UnderwaterCamera
@@ -89,7 +90,7 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
         errors.append(item.found.centre_px[partner] - lights.pixels[good])
         blur.append(lights.width_px[good] * (100.0 / lights.contrast_dn[good]) ** 2)
         score = np.clip(item.found.score[partner], 0.0, 0.999)
-        gains.append(10.0 * score / (1.0 - score) / snr)
+        gains.append(HALF_SCORE_SNR * score / (1.0 - score) / snr)
         wrong.append((item.found.class_id[partner] == 1) != lights.red[good])
         alarms += _unexplained(item)
     c50, factor, slope, ceiling = _fit_curve(np.concatenate(contrast), np.concatenate(around), np.concatenate(hits))

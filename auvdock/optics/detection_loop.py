@@ -8,6 +8,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import BLUE, HALF_SCORE_SNR, RED
 
 __all__ = ["drawn", "merge", "with_ghosts"]
 
@@ -57,8 +58,8 @@ def drawn(
             centre[k, axis] = pixels[i, axis] + spread * noise[i, axis]
             xyxy[k, axis], xyxy[k, 2 + axis] = centre[k, axis] - half, centre[k, axis] + half
         snr = score_gain * contrast[i] / noise_dn[i]
-        score[k] = snr / (snr + 10.0)
-        class_id[k] = 1 if red[i] != (chance[1, i] < wrong_colour) else 0
+        score[k] = snr / (snr + HALF_SCORE_SNR)
+        class_id[k] = RED if red[i] != (chance[1, i] < wrong_colour) else BLUE
     return index, centre, xyxy, score, class_id
 
 

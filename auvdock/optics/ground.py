@@ -6,7 +6,8 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.landing_station import LandingStationCfg
-from auvdock.optics.tag_pattern import BLACK_SHARE, CELLS, SQUARE_CELLS, tag_cells
+from auvdock.numeric.constants import TAG_CELLS, TAG_SQUARE_CELLS
+from auvdock.optics.tag_pattern import BLACK_SHARE, tag_cells
 from auvdock.optics.tag_scene import TagScene
 
 __all__ = ["Ground"]
@@ -59,9 +60,9 @@ class Ground:
     def _put_tag(self, local: Array, reflectance: Array) -> None:
         """Overwrite the reflectance where points (n, 3) of the station frame lie on the tag."""
         tag = self._scene.tag
-        cell = tag.size_m / SQUARE_CELLS
-        u = np.floor(0.5 * CELLS - (local[:, 1] - tag.position_m[1]) / cell)
-        v = np.floor(0.5 * CELLS - (local[:, 0] - tag.position_m[0]) / cell)
-        on = (u >= 0) & (u < CELLS) & (v >= 0) & (v < CELLS)
+        cell = tag.size_m / TAG_SQUARE_CELLS
+        u = np.floor(0.5 * TAG_CELLS - (local[:, 1] - tag.position_m[1]) / cell)
+        v = np.floor(0.5 * TAG_CELLS - (local[:, 0] - tag.position_m[0]) / cell)
+        on = (u >= 0) & (u < TAG_CELLS) & (v >= 0) & (v < TAG_CELLS)
         white = self._white[v[on].astype(np.int64), u[on].astype(np.int64)]
         reflectance[on] = np.where(white, 1.0, BLACK_SHARE) * tag.reflectance

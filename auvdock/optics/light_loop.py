@@ -12,6 +12,8 @@ import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import LEAST_EXPONENT
+from auvdock.numeric.lens import radial_factor
 
 __all__ = [
     "areas",
@@ -32,8 +34,6 @@ __all__ = [
 ]
 
 _NEAREST_M2 = 1e-4
-_LEAST_EXPONENT = -60.0
-"""Of a Gaussian; what is left there is below the rounding of any halo."""
 _VEILED_DN = 50.0
 
 
@@ -93,7 +93,7 @@ def located(rays: Array, lens: Array) -> tuple[Array, BoolArray]:
         r2 = x * x + y * y
         seen = r2 <= lens[0] and rays[i, 2] > 0.0
         r2 = min(r2, lens[0])
-        stretch = 1.0 + r2 * (lens[3] + r2 * (lens[4] + r2 * lens[5]))
+        stretch = radial_factor(r2, lens[3], lens[4], lens[5])
         pixels[i, 0], pixels[i, 1] = lens[6] * stretch * x + lens[8], lens[7] * stretch * y + lens[9]
         inside[i] = seen and abs(pixels[i, 0] - lens[10]) < lens[1] and abs(pixels[i, 1] - lens[11]) < lens[2]
     return pixels, inside
@@ -164,7 +164,7 @@ def spread(
             profile[i, k] = (below[k] + weight[i] * (above[k] - below[k])) * halos[i]
         for k in range(len(minus_half_r2)):
             exponent = minus_half_r2[k] / sigma2
-            if exponent <= _LEAST_EXPONENT:
+            if exponent <= LEAST_EXPONENT:
                 break
             profile[i, k] += peak * math.exp(exponent)
     return cores, halos, sigma, profile, channels

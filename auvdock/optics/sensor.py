@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, Image
-from auvdock.core.response import SATURATED_CODE
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import SATURATED_CODE
 from auvdock.optics.light_loop import codes, contrast, noise_dn
 from auvdock.optics.settings import ImagingCfg
 
-__all__ = ["SATURATED_CODE", "Sensor", "SensorScale", "saturated_share"]
+__all__ = ["Sensor", "SensorScale", "saturated_share"]
 
 _SPARE_PX = 64
 

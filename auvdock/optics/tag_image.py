@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
 from auvdock.core.transforms import invert
-from auvdock.optics.tag_pattern import CELLS, reflectances
+from auvdock.numeric.constants import TAG_CELLS
+from auvdock.optics.tag_pattern import reflectances
 from auvdock.optics.tag_pixels import add_tag
 from auvdock.optics.tag_scene import TagScene
 
@@ -40,8 +41,8 @@ class TagImage:
         # A pixel averages over its own width: variance 1/12.
         self._sigma_px = math.sqrt(cfg.lens_sigma_px**2 + 1.0 / 12.0)
         self._tangents: NDArray[np.float32] | None = None
-        steps = np.linspace(0.0, CELLS, 9)
-        low, high = np.zeros(9), np.full(9, float(CELLS))
+        steps = np.linspace(0.0, TAG_CELLS, 9)
+        low, high = np.zeros(9), np.full(9, float(TAG_CELLS))
         border = [(steps, low), (steps, high), (low, steps), (high, steps)]
         self._border = np.concatenate([np.column_stack([u, v, np.ones(9)]) for u, v in border])
 
@@ -113,7 +114,7 @@ class TagImage:
 
     def _blur_cells(self, plane: Array, back: Array) -> tuple[float, float]:
         """Standard deviation of the blur along u and v in cells, from the lens' scale in the middle of the tag."""
-        middle = plane @ np.array([0.5 * CELLS, 0.5 * CELLS, 1.0])
+        middle = plane @ np.array([0.5 * TAG_CELLS, 0.5 * TAG_CELLS, 1.0])
         camera = self.scene.lit.camera
         limit = self.scene.lit.lens.max_tangent
         tangent = middle[:2] / middle[2]
@@ -143,7 +144,7 @@ class TagImage:
         cells = np.column_stack([tangents, np.ones(len(tangents))]) @ back.T
         cells /= cells[:, 2:]
         # Far outside the tag's outline the plane may run away to the horizon.
-        np.clip(cells[:, :2], -CELLS, 2.0 * CELLS, out=cells[:, :2])
+        np.clip(cells[:, :2], -TAG_CELLS, 2.0 * TAG_CELLS, out=cells[:, :2])
         unit, veil = scene.unit_e_s(cells @ scene.cells_to_world.T, T_world_camera)
         lens = scene.lit.lens
         pixels = np.column_stack([np.tile(x, _KNOTS), np.repeat(y, _KNOTS)])

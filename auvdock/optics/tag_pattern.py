@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, Image
 from auvdock.core.landing_station import TagCfg
+from auvdock.numeric.constants import TAG_CELLS, TAG_SQUARE_CELLS
 
 __all__ = [
     "BLACK_SHARE",
-    "CELLS",
-    "SQUARE_CELLS",
     "corners_station_m",
     "reflectances",
     "tag_cells",
@@ -26,10 +25,6 @@ __all__ = [
     "tag_to_station",
 ]
 
-CELLS = 10
-"""Cells along an edge, white margin included."""
-SQUARE_CELLS = 8
-"""Cells along an edge of the black square, whose size is the tag's."""
 BLACK_SHARE = 0.1
 """Reflectance of black over white."""
 
@@ -38,8 +33,8 @@ def tag_cells(tag_id: int) -> NDArray[np.bool_]:
     """(10, 10) whether each cell is white, rows from the top; AprilTag family 36h11 as OpenCV draws it."""
     aruco: Any = cv2.aruco
     family = aruco.getPredefinedDictionary(aruco.DICT_APRILTAG_36h11)
-    square = aruco.generateImageMarker(family, tag_id, SQUARE_CELLS, borderBits=1)
-    cells = np.ones((CELLS, CELLS), dtype=np.bool_)
+    square = aruco.generateImageMarker(family, tag_id, TAG_SQUARE_CELLS, borderBits=1)
+    cells = np.ones((TAG_CELLS, TAG_CELLS), dtype=np.bool_)
     cells[1:-1, 1:-1] = np.asarray(square) > 127
     return cells
 
@@ -49,9 +44,9 @@ def tag_to_station(tag: TagCfg) -> Array:
 
     The tag lies face up with its upper edge towards the head (+x), so u runs to starboard (-y) and v aft (-x).
     """
-    cell = tag.size_m / SQUARE_CELLS
+    cell = tag.size_m / TAG_SQUARE_CELLS
     x, y, z = tag.position_m
-    middle = 0.5 * CELLS * cell
+    middle = 0.5 * TAG_CELLS * cell
     return np.array([[0.0, -cell, x + middle], [-cell, 0.0, y + middle], [0.0, 0.0, z]])
 
 
@@ -62,7 +57,7 @@ def corners_station_m(tag: TagCfg, margin_cells: float = 0.0) -> Array:
         tag: the tag.
         margin_cells: moves them out from the centre by this many cells along both edges.
     """
-    low, high = 1.0 - margin_cells, CELLS - 1.0 + margin_cells
+    low, high = 1.0 - margin_cells, TAG_CELLS - 1.0 + margin_cells
     corners = np.array([[low, low, 1.0], [high, low, 1.0], [high, high, 1.0], [low, high, 1.0]])
     return corners @ tag_to_station(tag).T
 

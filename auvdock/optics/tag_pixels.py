@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from auvdock.numeric.compiled import compiled
-from auvdock.optics.tag_pattern import CELLS
+from auvdock.numeric.constants import TAG_CELLS
 
 __all__ = ["add_tag"]
 
@@ -94,7 +94,7 @@ def _reflect(
     left, last = _within(u, np.float32(_REACH_SIGMAS) * sigma_u)
     top, bottom = _within(v, np.float32(_REACH_SIGMAS) * sigma_v)
     per_u, per_v = np.float32(1.0) / sigma_u, np.float32(1.0) / sigma_v
-    across = np.empty(CELLS + 2, dtype=np.float32)
+    across = np.empty(TAG_CELLS + 2, dtype=np.float32)
     for i in range(len(u)):
         row, column = top[i], left[i]
         value = cells[row, column]
@@ -110,8 +110,8 @@ def _reflect(
                 value += here if j == row else (here - above) * _normal((v[i] - np.float32(j - 1)) * per_v)
                 above = here
             share = np.float32(1.0)
-            if column == 0 or last[i] > CELLS or row == 0 or bottom[i] > CELLS:
-                end = np.float32(CELLS)
+            if column == 0 or last[i] > TAG_CELLS or row == 0 or bottom[i] > TAG_CELLS:
+                end = np.float32(TAG_CELLS)
                 share = _normal(u[i] * per_u) - _normal((u[i] - end) * per_u)
                 share *= _normal(v[i] * per_v) - _normal((v[i] - end) * per_v)
         light[3 * i] = light[3 * i + 1] = light[3 * i + 2] = value
@@ -120,9 +120,9 @@ def _reflect(
 
 @compiled
 def _within(place: NDArray[np.float32], reach: np.float32) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """First and last cell (n,) within reach of places (n,): from 0, the frame's, to CELLS + 1."""
+    """First and last cell (n,) within reach of places (n,): from 0, the frame's, to TAG_CELLS + 1."""
     first, last = np.empty(len(place), dtype=np.int32), np.empty(len(place), dtype=np.int32)
-    low, high, one = np.float32(0.0), np.float32(CELLS + 1), np.float32(1.0)
+    low, high, one = np.float32(0.0), np.float32(TAG_CELLS + 1), np.float32(1.0)
     for i in range(len(place)):
         # Truncation is the floor, since what is truncated is not below 0.
         first[i] = np.int32(min(max(place[i] - reach + one, low), high))

@@ -10,9 +10,10 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.landing_station import TagCfg
 from auvdock.core.transforms import invert
+from auvdock.numeric.constants import TAG_SQUARE_CELLS
 from auvdock.optics.illumination import Illumination
 from auvdock.optics.scene import LitScene, View
-from auvdock.optics.tag_pattern import BLACK_SHARE, SQUARE_CELLS, corners_station_m, tag_to_station
+from auvdock.optics.tag_pattern import BLACK_SHARE, corners_station_m, tag_to_station
 
 __all__ = ["TagScene", "TagView"]
 
@@ -106,7 +107,7 @@ class TagScene:
                 lit.lamp.backscatter_near(corners.mean(axis=0)[None, :], distance)[0] @ lit.electrons_per_j.T * solid
             )
         white = unit[0] * (self.tag.reflectance * solid)
-        return TagView(corners, float(edges.mean()) / SQUARE_CELLS, inside, white, white * BLACK_SHARE, around)
+        return TagView(corners, float(edges.mean()) / TAG_SQUARE_CELLS, inside, white, white * BLACK_SHARE, around)
 
     def _halos_e_s(self, view: View, ray_camera: Array) -> Array:
         """(3,) light of the lamps' halos and cores in the direction of the tag, on the sensor or off it."""

@@ -11,12 +11,11 @@ import numpy as np
 
 from auvdock.core.contracts import Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
+from auvdock.numeric.constants import HALF_SCORE_SNR
 from auvdock.perception.flux import spot_flux
 from auvdock.perception.spots import brightest_channel, inside, light_class, noise_sigma
 
 __all__ = ["BlobCfg", "BlobDetector"]
-
-_SCORE_HALF_SNR = 10.0
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ class BlobDetector:
             contrast = float(patch.max()) - float(np.percentile(patch, 10))
             snr = contrast / sigma
             class_id = light_class(frame.image, left + 3, top + 3, max(right - 3, left + 4), max(bottom - 3, top + 4))
-            score = snr / (snr + _SCORE_HALF_SNR)
+            score = snr / (snr + HALF_SCORE_SNR)
             rows.append((u - radius, v - radius, u + radius, v + radius, u, v, score, class_id))
         rows.sort(key=lambda row: (-row[6], row[5], row[4]))
         table = np.array(rows[: self._cfg.max_lights])

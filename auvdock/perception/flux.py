@@ -8,8 +8,8 @@ import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray, Image, IntArray
 from auvdock.core.contracts import Frame
-from auvdock.core.response import SATURATED_CODE
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import SATURATED_CODE
 
 __all__ = ["DISC_RAD", "spot_flux"]
 

@@ -8,12 +8,11 @@ import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.lights import PIXEL, SEEN, SIGMA
+from auvdock.numeric.tracks import BEACON_ID, COVARIANCE, DETECTION
 
 __all__ = ["labelled_lights"]
 
-# Said again from the tracker's tables: a function that Numba keeps does not notice when another file changes.
-_COVARIANCE = 4
-_BEACON_ID, _DETECTION = 2, 5
 _MIN_SEEN = 4
 """From this many beacons on, those seen in this frame stand alone."""
 
@@ -49,29 +48,29 @@ def labelled_lights(
     """
     seen = carried = 0
     for i in range(len(labels)):
-        if labels[i, _BEACON_ID] >= 0:
+        if labels[i, BEACON_ID] >= 0:
             carried += 1
-            if labels[i, _DETECTION] >= 0:
+            if labels[i, DETECTION] >= 0:
                 seen += 1
     count = seen if seen >= _MIN_SEEN else carried
     lights, owners = np.empty((count, 7)), np.empty((count, 2), dtype=np.int64)
     row = 0
     for beacon in range(len(array_m)):
         for i in range(len(labels)):
-            j = labels[i, _DETECTION]
-            if labels[i, _BEACON_ID] != beacon or (seen >= _MIN_SEEN and j < 0):
+            j = labels[i, DETECTION]
+            if labels[i, BEACON_ID] != beacon or (seen >= _MIN_SEEN and j < 0):
                 continue
             owners[row, 0], owners[row, 1] = i, beacon
             for k in range(3):
                 lights[row, k] = array_m[beacon, k]
             if j >= 0:
-                lights[row, 3], lights[row, 4] = centre_px[j, 0], centre_px[j, 1]
-                lights[row, 5], lights[row, 6] = sigma_px, 1.0
+                lights[row, PIXEL], lights[row, PIXEL + 1] = centre_px[j, 0], centre_px[j, 1]
+                lights[row, SIGMA], lights[row, SEEN] = sigma_px, 1.0
                 left, top, right, bottom = xyxy[j, 0], xyxy[j, 1], xyxy[j, 2], xyxy[j, 3]
                 if left <= 0.0 or top <= 0.0 or right >= size_px[0] - 1 or bottom >= size_px[1] - 1:
-                    lights[row, 5] += 0.5 * max(right - left, bottom - top)
+                    lights[row, SIGMA] += 0.5 * max(right - left, bottom - top)
             else:
-                lights[row, 3], lights[row, 4] = numbers[i, 0], numbers[i, 1]
-                lights[row, 5], lights[row, 6] = sigma_px + math.sqrt(numbers[i, _COVARIANCE]), 0.0
+                lights[row, PIXEL], lights[row, PIXEL + 1] = numbers[i, 0], numbers[i, 1]
+                lights[row, SIGMA], lights[row, SEEN] = sigma_px + math.sqrt(numbers[i, COVARIANCE]), 0.0
             row += 1
     return lights, owners, seen

@@ -19,7 +19,7 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.errors import ConfigError
-from auvdock.perception.pnp_refine import (
+from auvdock.numeric.lights import (
     ATTITUDE,
     COST,
     COVARIANCE,
@@ -31,9 +31,9 @@ from auvdock.perception.pnp_refine import (
     SIGMA,
     TRANSFORM,
     TRANSLATION,
-    solve_from,
-    vector_of,
 )
+from auvdock.numeric.rotations import vector_of
+from auvdock.perception.pnp_refine import solve_from
 from auvdock.perception.solvers import project, solve_pnp
 
 __all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "light_table", "translation_from_rotation"]

@@ -13,32 +13,28 @@ import math
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.numeric.cholesky import factorise, forward, solve
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.lens import FX, FY, K3, pixel_of, slopes
+from auvdock.numeric.lights import (
+    ATTITUDE,
+    COST,
+    COVARIANCE,
+    ERROR,
+    PIXEL,
+    RESIDUAL,
+    ROTATION,
+    SEEN,
+    SIGMA,
+    TRANSFORM,
+    TRANSLATION,
+)
+from auvdock.numeric.rotations import left_jacobian, rotation_of, vector_of
+from auvdock.numeric.scalars import cross
 
-__all__ = [
-    "ATTITUDE",
-    "COST",
-    "COVARIANCE",
-    "ERROR",
-    "PIXEL",
-    "RESIDUAL",
-    "ROTATION",
-    "SEEN",
-    "SIGMA",
-    "TRANSFORM",
-    "TRANSLATION",
-    "left_jacobian",
-    "refine",
-    "rotation_of",
-    "solve_from",
-    "vector_of",
-]
+__all__ = ["refine", "solve_from"]
 
-PIXEL, SIGMA, SEEN = 3, 5, 6
-"""Columns of a table of lights after X, Y, Z: u and v, σ of either, and 1 or 0 for seen or predicted."""
-TRANSLATION, ROTATION, TRANSFORM, COVARIANCE, ATTITUDE, COST, ERROR, RESIDUAL = 3, 6, 15, 31, 67, 68, 69, 70
-"""Where a result's parts begin, after the rotation vector."""
-_FX, _FY, _CX, _CY, _K1, _K2, _P1, _P2, _K3, _PRIOR_WEIGHT = range(10)
+_PRIOR_WEIGHT = K3 + 1
 _MAX_ITERATIONS = 20
 
 
@@ -177,12 +173,12 @@ def refine(
                 factor[i, j] = normal[i, j]
             if damping > 1e-9:
                 factor[i, i] += damping * normal[i, i]
-        if not _cholesky(factor):
+        if not factorise(factor):
             damping = max(10.0 * damping, 1e-3)
             continue
         for i in range(6):
             step[i] = gradient[i]
-        _substitute(factor, step)
+        solve(factor, step)
         # The expected fall of χ²: the square of the step in units of the pose's standard deviation.
         fall = 0.0
         for i in range(6):
@@ -191,7 +187,7 @@ def refine(
         if fall < decrement and damping <= 1e-9:
             # Undamped, so the factor is that of the normal matrix itself.
             return trial[5] > 0.0, trial, residual, factor, cost
-    return _cholesky(normal) and best[5] > 0.0, best, residual, normal, cost
+    return factorise(normal) and best[5] > 0.0, best, residual, normal, cost
 
 
 @compiled
@@ -230,8 +226,7 @@ def _normal_equations(
 def _project(pose: Array, lights: Array, terms: Array, image: Array, jacobian: Array) -> None:
     """Put the pixels (n, 2) of lights (n, 3 or more) under a pose (6,) into `image`, derivatives into (n, 2, 6)."""
     rotation, left = rotation_of(pose[:3]), left_jacobian(pose[:3])
-    fx, fy, cx, cy = terms[_FX], terms[_FY], terms[_CX], terms[_CY]
-    k1, k2, p1, p2, k3 = terms[_K1], terms[_K2], terms[_P1], terms[_P2], terms[_K3]
+    fx, fy = terms[FX], terms[FY]
     turned, by_r, by_y = np.empty(3), np.empty((3, 3)), np.zeros((2, 3))
     for n in range(len(lights)):
         for i in range(3):
@@ -239,23 +234,17 @@ def _project(pose: Array, lights: Array, terms: Array, image: Array, jacobian: A
         depth = turned[2] + pose[5]
         per_m = 1.0 / depth if depth != 0.0 else 1.0
         x, y = (turned[0] + pose[3]) * per_m, (turned[1] + pose[4]) * per_m
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        rise = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2)
-        image[n, 0] = fx * (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)) + cx
-        image[n, 1] = fy * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + cy
-        xx = fx * (radial + 2.0 * x * x * rise + 2.0 * p1 * y + 6.0 * p2 * x) * per_m
-        yy = fy * (radial + 2.0 * y * y * rise + 6.0 * p1 * y + 2.0 * p2 * x) * per_m
-        cross = (2.0 * x * y * rise + 2.0 * p1 * x + 2.0 * p2 * y) * per_m
-        by_y[0, 0], by_y[0, 1] = xx, fx * cross
-        by_y[1, 0], by_y[1, 1] = fy * cross, yy
+        image[n, 0], image[n, 1] = pixel_of(x, y, terms)
+        xx, yy, xy = slopes(x, y, terms)
+        by_y[0, 0], by_y[0, 1] = fx * xx * per_m, fx * (xy * per_m)
+        by_y[1, 0], by_y[1, 1] = fy * (xy * per_m), fy * yy * per_m
         for axis in range(2):
             by_y[axis, 2] = -by_y[axis, 0] * x - by_y[axis, 1] * y
         # -[R X] J_l, column by column.
         for j in range(3):
-            by_r[0, j] = turned[2] * left[1, j] - turned[1] * left[2, j]
-            by_r[1, j] = turned[0] * left[2, j] - turned[2] * left[0, j]
-            by_r[2, j] = turned[1] * left[0, j] - turned[0] * left[1, j]
+            by_r[0, j], by_r[1, j], by_r[2, j] = cross(
+                left[0, j], left[1, j], left[2, j], turned[0], turned[1], turned[2]
+            )
         for axis in range(2):
             for j in range(3):
                 jacobian[n, axis, j] = (
@@ -278,115 +267,19 @@ def _put_covariance(pose: Array, rotation: Array, factor: Array, result: Array) 
         result: as `solve_from` returns it.
     """
     left = left_jacobian(pose[:3])
-    x, y, z = pose[3], pose[4], pose[5]
     to = np.zeros((6, 6))
     for j in range(3):
-        a, b, c = y * left[2, j] - z * left[1, j], z * left[0, j] - x * left[2, j], x * left[1, j] - y * left[0, j]
+        a, b, c = cross(pose[3], pose[4], pose[5], left[0, j], left[1, j], left[2, j])
         for i in range(3):
             to[i, j] = -(rotation[0, i] * a + rotation[1, i] * b + rotation[2, i] * c)
             to[i, 3 + j] = -rotation[j, i]
             to[3 + i, j] = -left[i, j]
     # With L Lᵀ = JᵀWJ and M = L⁻¹ toᵀ the covariance is Mᵀ M.
     for row in range(6):
-        for i in range(6):
-            for k in range(i):
-                to[row, i] -= factor[i, k] * to[row, k]
-            to[row, i] /= factor[i, i]
+        forward(factor, to[row])
     for i in range(6):
         for j in range(i + 1):
             value = 0.0
             for k in range(6):
                 value += to[i, k] * to[j, k]
             result[COVARIANCE + 6 * i + j] = result[COVARIANCE + 6 * j + i] = value
-
-
-@compiled
-def rotation_of(vector: Array) -> Array:
-    """(3, 3) exp([r]) of a rotation vector (3,) (Rodrigues)."""
-    x, y, z = vector[0], vector[1], vector[2]
-    angle2 = x * x + y * y + z * z
-    angle = math.sqrt(angle2)
-    if angle < 1e-8:
-        sine, rest = 1.0, 0.5
-    else:
-        sine, rest = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle2
-    rotation = np.empty((3, 3))
-    rotation[0, 0], rotation[0, 1] = 1.0 - rest * (y * y + z * z), rest * x * y - sine * z
-    rotation[0, 2] = rest * x * z + sine * y
-    rotation[1, 0], rotation[1, 1] = rest * x * y + sine * z, 1.0 - rest * (x * x + z * z)
-    rotation[1, 2] = rest * y * z - sine * x
-    rotation[2, 0], rotation[2, 1] = rest * x * z - sine * y, rest * y * z + sine * x
-    rotation[2, 2] = 1.0 - rest * (x * x + y * y)
-    return rotation
-
-
-@compiled
-def vector_of(rotation: Array) -> Array:
-    """(3,) rotation vector of a rotation matrix; at half a turn that whose first component is not negative."""
-    vector = np.empty(3)
-    vector[0] = 0.5 * (rotation[2, 1] - rotation[1, 2])
-    vector[1] = 0.5 * (rotation[0, 2] - rotation[2, 0])
-    vector[2] = 0.5 * (rotation[1, 0] - rotation[0, 1])
-    sine = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    cosine = 0.5 * (rotation[0, 0] + rotation[1, 1] + rotation[2, 2] - 1.0)
-    if sine > 1e-6:
-        vector *= math.atan2(sine, cosine) / sine
-    elif cosine < 0.0:
-        # R = 2 a aᵀ - 1: from the greatest component of the axis a, known best, follow the others.
-        k = 0
-        for i in range(1, 3):
-            if rotation[i, i] > rotation[k, k]:
-                k = i
-        for i in range(3):
-            vector[i] = 0.25 * (rotation[i, k] + rotation[k, i]) + (0.5 if i == k else 0.0)
-        size = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-        vector *= (-math.pi if vector[0] < 0.0 else math.pi) / size
-    return vector
-
-
-@compiled
-def left_jacobian(vector: Array) -> Array:
-    """(3, 3) J_l with exp([r + dr]) = exp([J_l dr]) exp([r]) to first order (Barfoot 2017, equation 7.77)."""
-    x, y, z = vector[0], vector[1], vector[2]
-    angle = math.sqrt(x * x + y * y + z * z)
-    left = np.eye(3)
-    if angle < 1e-8:
-        return left
-    sine = math.sin(angle) / angle
-    a, b, c = x / angle, y / angle, z / angle
-    k, h = 1.0 - sine, (1.0 - math.cos(angle)) / angle
-    left[0, 0], left[0, 1], left[0, 2] = sine + k * a * a, k * a * b - h * c, k * a * c + h * b
-    left[1, 0], left[1, 1], left[1, 2] = k * a * b + h * c, sine + k * b * b, k * b * c - h * a
-    left[2, 0], left[2, 1], left[2, 2] = k * a * c - h * b, k * b * c + h * a, sine + k * c * c
-    return left
-
-
-@compiled
-def _cholesky(matrix: Array) -> bool:
-    """Put the lower factor of a symmetric matrix into its lower triangle; False where it is not positive definite."""
-    for i in range(len(matrix)):
-        for j in range(i + 1):
-            value = matrix[i, j]
-            for k in range(j):
-                value -= matrix[i, k] * matrix[j, k]
-            if i > j:
-                matrix[i, j] = value / matrix[j, j]
-            elif value > 0.0:
-                matrix[i, i] = math.sqrt(value)
-            else:
-                return False
-    return True
-
-
-@compiled
-def _substitute(factor: Array, right: Array) -> None:
-    """Solve L Lᵀ x = b for a lower factor (n, n), in place of b (n,)."""
-    size = len(right)
-    for i in range(size):
-        for k in range(i):
-            right[i] -= factor[i, k] * right[k]
-        right[i] /= factor[i, i]
-    for i in range(size - 1, -1, -1):
-        for k in range(i + 1, size):
-            right[i] -= factor[k, i] * right[k]
-        right[i] /= factor[i, i]

@@ -11,6 +11,7 @@ from auvdock.core.camera import Camera
 from auvdock.core.contracts import Bearing, Proprioception
 from auvdock.core.transforms import rotation_from_euler_zyx, wrap_angle
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.rotations import rotation_of_euler_zyx
 
 __all__ = ["AttitudePrior", "FacingHeading"]
 
@@ -66,13 +67,9 @@ class FacingHeading:
 @compiled
 def _camera_station(camera_body: Array, euler_zyx_rad: Array, station_yaw_rad: float) -> Array:
     """(3, 3) R_camera_body (Rz(yaw) Ry(pitch) Rx(roll))ᵀ Rz(station yaw)."""
-    roll, pitch, yaw = euler_zyx_rad[0], euler_zyx_rad[1], euler_zyx_rad[2]
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    cy, sy, cs, ss = math.cos(yaw), math.sin(yaw), math.cos(station_yaw_rad), math.sin(station_yaw_rad)
-    world_body, world_station = np.empty((3, 3)), np.zeros((3, 3))
-    world_body[0, 0], world_body[0, 1], world_body[0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
-    world_body[1, 0], world_body[1, 1], world_body[1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
-    world_body[2, 0], world_body[2, 1], world_body[2, 2] = -sp, cp * sr, cp * cr
+    world_body = rotation_of_euler_zyx(euler_zyx_rad[0], euler_zyx_rad[1], euler_zyx_rad[2])
+    world_station = np.zeros((3, 3))
+    cs, ss = math.cos(station_yaw_rad), math.sin(station_yaw_rad)
     world_station[0, 0], world_station[0, 1], world_station[1, 0], world_station[1, 1] = cs, -ss, ss, cs
     world_station[2, 2] = 1.0
     return camera_body @ world_body.T @ world_station

@@ -8,13 +8,11 @@ import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import BLUE
+from auvdock.numeric.tracks import CLASS_ID, DETECTION, window_of
 
 __all__ = ["propose", "surest_lights"]
 
-# Said again from other files: a function that Numba keeps does not notice when those change.
-_BLUE = 0
-_HISTORY = 7
-_CLASS_ID, _DETECTION = 1, 5
 _LEAST_DEPTH_M = 0.1
 _LEAST_SPREAD = 1e-12
 
@@ -33,13 +31,9 @@ def surest_lights(numbers: Array, labels: IntArray, min_occurrences: int, min_co
     rows, confidence = np.empty(len(labels), dtype=np.int64), np.empty(len(labels))
     count = 0
     for i in range(len(labels)):
-        if labels[i, _CLASS_ID] != _BLUE or labels[i, _DETECTION] < 0:
+        if labels[i, CLASS_ID] != BLUE or labels[i, DETECTION] < 0:
             continue
-        occurrences, total = 0, 0.0
-        for k in range(_HISTORY, numbers.shape[1]):
-            total += numbers[i, k]
-            if numbers[i, k] != 0.0:
-                occurrences += 1
+        occurrences, total = window_of(numbers, i)
         mean = total / max(occurrences, 1)
         if occurrences < min_occurrences or mean < min_confidence:
             continue

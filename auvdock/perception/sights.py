@@ -10,6 +10,10 @@ from auvdock.core.arrays import Array, IntArray
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import BLUE, RED
+from auvdock.numeric.lens import FX, pixel_of, tangents_of
+from auvdock.numeric.lights import ROTATION, TRANSLATION
+from auvdock.numeric.tracks import CLASS_ID, HISTORY, HITS, MISSED, TRACK_ID, window_of
 
 __all__ = ["CENTRE", "ENTRANCE", "FOLLOWED", "LONG_RANGE", "RANGE", "RAY", "SCORE", "find_sights", "sight_terms"]
 
@@ -17,14 +21,8 @@ RAY, CENTRE, SCORE, RANGE = 0, 3, 5, 6
 """Where a bearing's parts begin: unit ray in the camera frame, pixel, confidence, range."""
 LONG_RANGE, ENTRANCE, FOLLOWED = 0, 7, 14
 """Where the two bearings begin, and the track that is followed."""
-_FX, _FY, _CX, _CY, _K1, _K2, _P1, _P2, _K3 = range(9)
 _BLUE_SPREAD, _RED_SPREAD, _CENTRE_X, _CENTRE_Y, _CENTRE_Z = range(9, 14)
-_OCCURRENCES, _MISSED, _GROUP, _LOYALTY = range(14, 18)
-# What is another file's is said again here: a function that Numba keeps does not notice when it changes there.
-_BLUE, _RED = 0, 1
-_TRANSLATION, _ROTATION = 3, 6
-_HISTORY = 7
-_TRACK_LABEL, _CLASS_LABEL, _MISSED_LABEL, _HITS_LABEL = 0, 1, 3, 4
+_OCCURRENCES, _MOST_MISSED, _GROUP, _LOYALTY = range(14, 18)
 
 
 def sight_terms(
@@ -61,14 +59,14 @@ def find_sights(numbers: Array, labels: IntArray, pose: Array, terms: Array, fol
     result = np.full(FOLLOWED + 1, np.nan)
     result[FOLLOWED] = followed
     lights = np.empty((len(labels), 5))
-    count = _steady(numbers, labels, _RED, terms, lights)
+    count = _steady(numbers, labels, RED, terms, lights)
     if count > 0:
         _group(lights, count, terms[_RED_SPREAD], terms, result[ENTRANCE:FOLLOWED])
     long_range = result[LONG_RANGE:ENTRANCE]
     if len(pose) > 0:
         _array_centre(pose, terms, long_range)
         return result
-    count = _steady(numbers, labels, _BLUE, terms, lights)
+    count = _steady(numbers, labels, BLUE, terms, lights)
     if count >= terms[_GROUP]:
         _group(lights, count, terms[_BLUE_SPREAD], terms, long_range)
     elif count > 0:
@@ -81,21 +79,17 @@ def find_sights(numbers: Array, labels: IntArray, pose: Array, terms: Array, fol
 @compiled
 def _steady(numbers: Array, labels: IntArray, class_id: int, terms: Array, lights: Array) -> int:
     """Put u, v, mean score over the window and track id of each steady light of a class into a row; their number."""
-    window = numbers.shape[1] - _HISTORY
+    window = numbers.shape[1] - HISTORY
     least, count = terms[_OCCURRENCES], 0
     for i in range(len(labels)):
-        if labels[i, _CLASS_LABEL] != class_id or labels[i, _HITS_LABEL] < least:
+        if labels[i, CLASS_ID] != class_id or labels[i, HITS] < least:
             continue
-        if labels[i, _MISSED_LABEL] > terms[_MISSED]:
+        if labels[i, MISSED] > terms[_MOST_MISSED]:
             continue
-        occurrences, total = 0, 0.0
-        for k in range(_HISTORY, _HISTORY + window):
-            total += numbers[i, k]
-            if numbers[i, k] != 0.0:
-                occurrences += 1
+        occurrences, total = window_of(numbers, i)
         if occurrences >= least:
             lights[count, 0], lights[count, 1], lights[count, 2] = numbers[i, 0], numbers[i, 1], total / window
-            lights[count, 3] = labels[i, _TRACK_LABEL]
+            lights[count, 3] = labels[i, TRACK_ID]
             count += 1
     return count
 
@@ -137,7 +131,7 @@ def _group(lights: Array, count: int, spread_m: float, terms: Array, bearing: Ar
             square += (lights[i, 0] - u) ** 2 + (lights[i, 1] - v) ** 2
         square /= n
         if square > 1.0:
-            range_m = spread_m * terms[_FX] / math.sqrt(square)
+            range_m = spread_m * terms[FX] / math.sqrt(square)
     _bearing(u, v, score, range_m, terms, bearing)
 
 
@@ -187,38 +181,21 @@ def _array_centre(pose: Array, terms: Array, bearing: Array) -> None:
     """Bearing of the array's centre under a pose."""
     centre = np.empty(3)
     for i in range(3):
-        row = _ROTATION + 3 * i
+        row = ROTATION + 3 * i
         centre[i] = pose[row] * terms[_CENTRE_X] + pose[row + 1] * terms[_CENTRE_Y]
         centre[i] += pose[row + 2] * terms[_CENTRE_Z]
-        centre[i] += pose[_TRANSLATION + i]
+        centre[i] += pose[TRANSLATION + i]
     range_m = math.sqrt(centre[0] * centre[0] + centre[1] * centre[1] + centre[2] * centre[2])
     for i in range(3):
         bearing[RAY + i] = centre[i] / range_m
-    x, y = centre[0] / centre[2], centre[1] / centre[2]
-    r2 = x * x + y * y
-    p1, p2 = terms[_P1], terms[_P2]
-    radial = 1.0 + r2 * (terms[_K1] + r2 * (terms[_K2] + r2 * terms[_K3]))
-    u = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    v = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-    bearing[CENTRE], bearing[CENTRE + 1] = u * terms[_FX] + terms[_CX], v * terms[_FY] + terms[_CY]
+    bearing[CENTRE], bearing[CENTRE + 1] = pixel_of(centre[0] / centre[2], centre[1] / centre[2], terms)
     bearing[SCORE], bearing[RANGE] = 1.0, range_m
 
 
 @compiled
 def _bearing(u: float, v: float, score: float, range_m: float, terms: Array, bearing: Array) -> None:
-    """Bearing of a pixel; its ray by fixed-point iteration on the lens distortion."""
-    p1, p2 = terms[_P1], terms[_P2]
-    x0, y0 = (u - terms[_CX]) / terms[_FX], (v - terms[_CY]) / terms[_FY]
-    x, y = x0, y0
-    for _ in range(50):
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (terms[_K1] + r2 * (terms[_K2] + r2 * terms[_K3]))
-        x_new = (x0 - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial
-        y_new = (y0 - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial
-        done = abs(x_new - x) + abs(y_new - y) < 1e-10
-        x, y = x_new, y_new
-        if done:
-            break
+    """Bearing of a pixel."""
+    x, y = tangents_of(u, v, terms)
     scale = 1.0 / math.sqrt(1.0 + x * x + y * y)
     bearing[RAY], bearing[RAY + 1], bearing[RAY + 2] = x * scale, y * scale, scale
     bearing[CENTRE], bearing[CENTRE + 1] = u, v

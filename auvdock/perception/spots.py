@@ -10,6 +10,7 @@ import numpy as np
 from auvdock.core.arrays import Array, Image, IntArray
 from auvdock.core.contracts import BLUE, RED, Detections, RegionOfInterest
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import SATURATED_CODE
 
 __all__ = [
     "CELL_PX",
@@ -25,7 +26,6 @@ __all__ = [
 CELL_PX = 8
 """Side of a cell of the low-resolution background."""
 _MARGIN_PX = 64
-_SATURATED = 250
 
 
 def brightest_channel(image: Image) -> Image:
@@ -74,7 +74,7 @@ def light_class(image: Image, left: int, top: int, right: int, bottom: int) -> i
     height, width = image.shape[:2]
     pad = 3
     patch = image[max(top - pad, 0) : min(bottom + pad, height), max(left - pad, 0) : min(right + pad, width)]
-    usable = cv2.inRange(patch, (0, 0, 0), (_SATURATED - 1,) * 3)
+    usable = cv2.inRange(patch, (0, 0, 0), (SATURATED_CODE - 1,) * 3)
     red, _, blue, _ = cv2.mean(patch, usable) if cv2.countNonZero(usable) else cv2.mean(patch)
     # A low quantile: another light may stand on part of the rim.
     rim = np.sort(np.concatenate([patch[0], patch[-1], patch[:, 0], patch[:, -1]]), axis=0)

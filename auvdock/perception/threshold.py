@@ -17,6 +17,7 @@ import numpy as np
 from auvdock.core.arrays import Image
 from auvdock.core.contracts import Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
+from auvdock.numeric.constants import HALF_SCORE_SNR
 from auvdock.perception.components import components
 from auvdock.perception.flux import DISC_RAD, spot_flux
 from auvdock.perception.spots import background, brightest_channel, crop_of, inside, light_class, noise_sigma
@@ -28,7 +29,6 @@ _CUTS = (0.1, 0.2, 0.35, 0.5, 0.75, 0.9)
 """Levels between floor and peak at which a component is cut again; the low ones free a dim light by a bright one."""
 _LARGE_PX = 300
 """A box smaller than this holds no second, dimmer light: the low levels are left out."""
-_SCORE_HALF_SNR = 10.0
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class ThresholdDetector:
         snr = np.array([s.peak for s in spots]) / sigma
         classes = np.array([light_class(image, s.left, s.top, s.right, s.bottom) for s in spots], dtype=np.int64)
         offset = np.array([left, top], dtype=np.float64)
-        return Detections(boxes + np.tile(offset, 2) - 0.5, centres + offset, snr / (snr + _SCORE_HALF_SNR), classes)
+        return Detections(boxes + np.tile(offset, 2) - 0.5, centres + offset, snr / (snr + HALF_SCORE_SNR), classes)
 
     def _components(self, contrast: Image, threshold: float) -> list[tuple[int, int, int, int, int]]:
         """(x, y, width, height, area) of the components above a threshold."""

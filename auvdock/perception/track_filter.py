@@ -1,8 +1,8 @@
 """One frame of all tracks in one compiled call: predict, pair, correct, count, end and start; loops of the tracker.
 
-A track is a row of two tables, its numbers (`STATE`, `COVARIANCE`, then one score for each frame of the window) and its
-labels (`TRACK_ID` to `DETECTION`). The tables have room for more rows than there are tracks, so tracks end and start in
-place. The filter's settings come as one array, `filter_terms`: Numba takes that at the price of a single number.
+A track is a row of two tables, its numbers and its labels (`numeric.tracks`). The tables have room for more rows than
+there are tracks, so tracks end and start in place. The filter's settings come as one array, `filter_terms`: Numba takes
+that at the price of a single number.
 """
 
 from __future__ import annotations
@@ -11,30 +11,20 @@ import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.tracks import (
+    BEACON_ID,
+    CLASS_ID,
+    COVARIANCE,
+    DETECTION,
+    HISTORY,
+    HITS,
+    LABELS,
+    MISSED,
+    TRACK_ID,
+)
 
-__all__ = [
-    "BEACON_ID",
-    "CLASS_ID",
-    "COVARIANCE",
-    "DETECTION",
-    "HISTORY",
-    "HITS",
-    "LABELS",
-    "MISSED",
-    "STATE",
-    "TRACK_ID",
-    "advance",
-    "distances",
-    "filter_terms",
-    "settle",
-]
+__all__ = ["advance", "distances", "filter_terms", "settle"]
 
-STATE, COVARIANCE, HISTORY = 0, 4, 7
-"""First columns of the numbers: u, v, u̇, v̇; P₀₀, P₀₁, P₁₁ of one axis; the window's scores."""
-TRACK_ID, CLASS_ID, BEACON_ID, MISSED, HITS, DETECTION = range(6)
-"""Columns of the labels."""
-LABELS = 6
-"""Number of them."""
 _DT, _POWER, _GATE, _PIXEL, _SPEED, _LEFT, _TOP, _RIGHT, _BOTTOM, _CONFIRM, _LASTING, _TENTATIVE = range(12)
 
 

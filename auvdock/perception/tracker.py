@@ -15,17 +15,8 @@ from scipy.optimize import linear_sum_assignment
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
-from auvdock.perception.track_filter import (
-    COVARIANCE,
-    DETECTION,
-    HISTORY,
-    LABELS,
-    STATE,
-    advance,
-    distances,
-    filter_terms,
-    settle,
-)
+from auvdock.numeric.tracks import COVARIANCE, DETECTION, HISTORY, LABELS, STATE
+from auvdock.perception.track_filter import advance, distances, filter_terms, settle
 from auvdock.perception.views import TrackViews
 
 __all__ = ["LightTracker", "TrackerCfg"]

@@ -11,6 +11,8 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.marine import flip_vector
 from auvdock.core.vehicle import HullPartCfg, VehicleCfg
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.rotations import rotation_of_quat_wxyz
+from auvdock.numeric.scalars import cross
 
 __all__ = ["Immersion", "immerse"]
 
@@ -76,10 +78,8 @@ def immerse(qpos: Array, qvel: Array, pieces: Array, actuators: Array, out: Arra
         out: (5 + n,) takes the hull's share s, in which exactly 1 is all; ds/dt in 1/s while it grows, else 0; the
             moment Σ f w p of the shares about the origin in m, body frame (3); the actuators' shares.
     """
-    w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
-    up_x, up_y, up_z = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-    p, q, r = qvel[3], qvel[4], qvel[5]
-    rise_x, rise_y, rise_z = up_y * r - up_z * q, up_z * p - up_x * r, up_x * q - up_y * p
+    _, _, (up_x, up_y, up_z) = rotation_of_quat_wxyz(qpos[3], qpos[4], qpos[5], qpos[6])
+    rise_x, rise_y, rise_z = cross(up_x, up_y, up_z, qvel[3], qvel[4], qvel[5])
     dry, growth = 0.0, 0.0
     for i in range(5):
         out[i] = 0.0

@@ -11,6 +11,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import ConfigError
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.scalars import within_pi
 
 __all__ = ["SensorCfg", "Sensors"]
 
@@ -134,6 +135,5 @@ def _readings(
         out[4 + i] += nu_body[3 + i]
         out[7 + i] += scale * nu_body[i]
         out[10 + i] += scale * nu_relative_body[i]
-    yaw = out[3] + datum_rad
-    out[3] = yaw - 2.0 * math.pi * np.rint(yaw / (2.0 * math.pi))
+    out[3] = within_pi(out[3] + datum_rad)
     return out

@@ -13,6 +13,8 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.rotations import rotation_of_quat_wxyz
+from auvdock.numeric.scalars import cross
 from auvdock.sim.mj import c_function
 
 __all__ = [
@@ -136,10 +138,10 @@ def advance(
         if is_absurd(qpos, qvel, origin):
             break
         reach = constants[3]
-        w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
-        height = constants[4] * (qpos[0] + reach * (1.0 - 2.0 * (y * y + z * z)))
-        height += constants[5] * (qpos[1] + reach * 2.0 * (x * y + w * z))
-        height += constants[6] * (qpos[2] + reach * 2.0 * (x * z - w * y))
+        ahead = rotation_of_quat_wxyz(qpos[3], qpos[4], qpos[5], qpos[6])
+        height = constants[4] * (qpos[0] + reach * ahead[0][0])
+        height += constants[5] * (qpos[1] + reach * ahead[1][0])
+        height += constants[6] * (qpos[2] + reach * ahead[2][0])
         if height <= constants[7]:
             break
     motion(qpos, qvel, current, gust, moving)
@@ -227,10 +229,10 @@ def motion(qpos: Array, qvel: Array, current: Array, gust: Array, out: Array) ->
     """
     for i in range(MOTION):
         out[i] = 0.0
-    w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
-    out[0], out[1], out[2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-    out[4], out[5], out[6] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-    out[8], out[9], out[10] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+    rows = rotation_of_quat_wxyz(qpos[3], qpos[4], qpos[5], qpos[6])
+    out[0], out[1], out[2] = rows[0]
+    out[4], out[5], out[6] = rows[1]
+    out[8], out[9], out[10] = rows[2]
     out[3], out[7], out[11], out[15] = qpos[0], qpos[1], qpos[2], 1.0
     out[16], out[18] = math.atan2(out[9], out[10]), math.atan2(out[4], out[0])
     out[17] = -math.asin(max(-1.0, min(1.0, out[8])))
@@ -361,9 +363,10 @@ def wrench(
     for i in range(6):
         z[6 + i] = z[i] * abs(z[i])
         z[12 + i] = s * z[i]
-    z[18] += q * w - r * v
-    z[19] += r * u - p * w
-    z[20] += p * v - q * u
+    turn = cross(p, q, r, u, v, w)
+    z[18] += turn[0]
+    z[19] += turn[1]
+    z[20] += turn[2]
     for i in range(len(state)):
         z[21 + i] = state[i] * immersion[5 + i]
         if actuators[2, i] < 0.0:
@@ -383,10 +386,9 @@ def wrench(
     my = out[4] + pz * u - px * w + hz * p - hx * r
     mz = out[5] + px * v - py * u + hx * q - hy * p
     if immersion[0] < 1.0:
-        lift = constants[1]
-        mx += lift * (immersion[3] * rotation[2, 2] - immersion[4] * rotation[2, 1])
-        my += lift * (immersion[4] * rotation[2, 0] - immersion[2] * rotation[2, 2])
-        mz += lift * (immersion[2] * rotation[2, 1] - immersion[3] * rotation[2, 0])
+        lift, arm = constants[1], immersion[2:5]
+        tilt = cross(arm[0], arm[1], arm[2], rotation[2, 0], rotation[2, 1], rotation[2, 2])
+        mx, my, mz = mx + lift * tilt[0], my + lift * tilt[1], mz + lift * tilt[2]
         grown = immersion[1] / max(immersion[0], 1e-9)
         fx, fy, fz = fx - grown * px, fy - grown * py, fz - grown * pz
         mx, my, mz = mx - grown * hx, my - grown * hy, mz - grown * hz

@@ -3,6 +3,7 @@
 import errno
 import importlib.util
 import os
+import shutil
 import sys
 import warnings
 from pathlib import Path
@@ -34,15 +35,21 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def called(folder, factor=2.5, x=4.0):
-    """The module as another process would load it: its value, whether it was compiled, and what was warned of."""
+def loaded(folder, text):
+    """A module of such a text as another process would load it."""
     source = folder / "tiny.py"
-    source.write_text(SOURCE.format(factor=factor), encoding="utf-8")
+    source.write_text(text, encoding="utf-8")
     spec = importlib.util.spec_from_file_location("tiny", source)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+def called(folder, factor=2.5, x=4.0):
+    """The module as another process would load it: its value, whether it was compiled, and what was warned of."""
+    module = loaded(folder, SOURCE.format(factor=factor))
     new = []
     kept_code._said.clear()
     with warnings.catch_warnings(record=True) as told, compiling(lambda: new.append(True)):
@@ -73,6 +80,79 @@ def test_code_of_another_source_is_left_without_a_word(place):
     called(place, factor=2.5)
     # Only a constant differs: the byte code is the same.
     assert called(place, factor=3.5)[1:] == (True, [])
+
+
+@pytest.fixture
+def room(place, monkeypatch):
+    """A copy of the shared room whose files count in the place of the installed ones."""
+    copy = place / "numeric"
+    shutil.copytree(kept_code._ROOM, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    assert len(list(copy.glob("*.py"))) > 5
+    monkeypatch.setattr(kept_code, "_ROOM", copy)
+    yield copy
+    kept_code._hash_of.cache_clear()
+
+
+def change_one_number(room):
+    file = room / "constants.py"
+    text = file.read_text(encoding="utf-8")
+    assert "SATURATED_CODE = 250" in text
+    file.write_text(text.replace("SATURATED_CODE = 250", "SATURATED_CODE = 251"), encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        change_one_number,
+        lambda room: (room / "another.py").touch(),
+        lambda room: (room / "scalars.py").unlink(),
+        lambda room: (room / "scalars.py").rename(room / "numbers.py"),
+    ],
+    ids=["a number", "a new file", "a file less", "another name"],
+)
+def test_code_is_left_when_the_shared_room_changes(place, room, change):
+    called(place)
+    kept_code._hash_of.cache_clear()  # another process reads the room anew
+    assert called(place)[1:] == (False, [])
+    change(room)
+    kept_code._hash_of.cache_clear()
+    assert called(place)[1:] == (True, [])
+    assert called(place)[1:] == (False, [])
+
+
+SHARED = """
+from auvdock.numeric.compiled import compiled
+FACTOR = {factor}
+
+@compiled
+def doubled(x):
+    return 2.0 * x
+"""
+USER = """
+from auvdock.numeric.compiled import compiled
+from shared_by_kernels import FACTOR, doubled
+
+@compiled
+def raised(x):
+    return FACTOR * doubled(x)
+"""
+
+
+def test_what_a_kernel_took_from_the_shared_room_is_never_stale(place, monkeypatch):
+    room = place / "room"
+    room.mkdir()
+    monkeypatch.setattr(kept_code, "_ROOM", room)
+    monkeypatch.syspath_prepend(room)
+    values = []
+    for shared in (SHARED, SHARED, SHARED.replace("{factor}", "7.0"), SHARED.replace("2.0 * x", "3.0 * x")):
+        (room / "shared_by_kernels.py").write_text(shared.format(factor=5.0), encoding="utf-8")
+        kept_code._hash_of.cache_clear()
+        sys.modules.pop("shared_by_kernels", None)
+        importlib.invalidate_caches()
+        values.append(loaded(place, USER).raised(1.0))
+    kept_code._hash_of.cache_clear()
+    assert values == [10.0, 10.0, 14.0, 15.0]
+    assert len(list((place / "__pycache__").glob("tiny.raised.*.nbc"))) == 1  # of the same name all along
 
 
 def replace_by_folder(path):

@@ -10,12 +10,13 @@ from scipy.special import ndtr
 
 from auvdock.core.landing_station import TagCfg
 from auvdock.core.transforms import invert
+from auvdock.numeric.constants import TAG_CELLS
 from auvdock.optics.faults import FaultCfg
 from auvdock.optics.lamp import LampCfg
 from auvdock.optics.landing_camera import landing_imaging
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.settings import ExposureCfg
-from auvdock.optics.tag_pattern import CELLS, corners_station_m, reflectances, tag_cells, tag_png, tag_to_station
+from auvdock.optics.tag_pattern import corners_station_m, reflectances, tag_cells, tag_png, tag_to_station
 from auvdock.optics.tag_pixels import add_tag
 from auvdock.optics.water import WaterCfg
 from auvdock.sim.mj import mujoco
@@ -116,7 +117,7 @@ def test_drawing_equals_brute_supersampling():
         plane[:, 2] += to_camera[:3, 3]
         cells = np.column_stack([rays, np.ones(len(rays))]) @ np.linalg.inv(plane).T
         cells = cells[:, :2] / cells[:, 2:]
-        on = np.all((cells >= 0.0) & (cells < CELLS), axis=1)
+        on = np.all((cells >= 0.0) & (cells < TAG_CELLS), axis=1)
         white = tag_cells(0)[cells[:, 1].clip(0, 9).astype(int), cells[:, 0].clip(0, 9).astype(int)]
         sharp = np.where(on, np.where(white, 0.9, 0.09), 0.0).reshape(len(y), len(x)).astype(np.float32)
         blurred = cv2.GaussianBlur(sharp, (0, 0), 0.8 * fine, borderType=cv2.BORDER_CONSTANT)
@@ -151,7 +152,7 @@ def test_a_nearby_tag_equals_the_closed_form_at_every_pixel(place):
     cells = np.column_stack([unit.lit.camera.normalise(grid), np.ones(len(grid))]) @ np.linalg.inv(plane).T
     cells = (cells[:, :2] / cells[:, 2:]).reshape(600, 800, 2)
     per_px = np.hypot(np.gradient(cells, axis=0), np.gradient(cells, axis=1))
-    edges = np.arange(CELLS + 1.0)
+    edges = np.arange(TAG_CELLS + 1.0)
     sigma = math.sqrt(0.8**2 + 1.0 / 12.0) * per_px
     u, v = (np.diff(ndtr((edges - cells[:, :, k : k + 1]) / sigma[:, :, k : k + 1]), axis=2) for k in range(2))
     wanted = np.einsum("yxr,rc,yxc->yx", v, np.where(tag_cells(0), 0.9, 0.09), u)
@@ -213,15 +214,15 @@ def test_the_pattern_covers_the_tag_and_nothing_else(sigma, veil):
     reflected, covered = pattern(place, sigma, veil)
     # A Gaussian keeps what there is; sums of its samples equal integrals where it is wider than the step.
     rel = 2e-4 if sigma > step else 2e-2
-    assert float(covered.sum()) * step**2 == pytest.approx(CELLS**2, rel=rel)
+    assert float(covered.sum()) * step**2 == pytest.approx(TAG_CELLS**2, rel=rel)
     white = float(tag_cells(0).sum()) * 0.9 + float((~tag_cells(0)).sum()) * 0.09
     assert float(reflected.sum()) * step**2 == pytest.approx(white, rel=rel)
     assert float(covered.max()) <= 1.0 + 1e-5
-    beyond = (place < -4.5 * sigma) | (place > CELLS + 4.5 * sigma)
+    beyond = (place < -4.5 * sigma) | (place > TAG_CELLS + 4.5 * sigma)
     assert not covered[beyond].any()
     assert not covered[:, beyond].any()
     # Bounds for what is left out beyond 4.5 σ of an edge, and for the table of the normal distribution.
-    edges = np.arange(CELLS + 1.0)
+    edges = np.arange(TAG_CELLS + 1.0)
     share = np.diff(ndtr((edges - place[:, None]) / sigma), axis=1)
     wanted = share @ np.where(tag_cells(0), 0.9, 0.09) @ share.T
     assert np.abs(reflected - wanted).max() < 3e-5

@@ -11,7 +11,7 @@ from perception_scenes import ARRAY, CAMERA, FAR, LAYOUT, RED
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.contracts import BLUE
 from auvdock.core.contracts import RED as RED_CLASS
-from auvdock.perception.pnp_refine import rotation_of
+from auvdock.numeric.rotations import rotation_of
 from auvdock.perception.sights import ENTRANCE, FOLLOWED, LONG_RANGE, SCORE, find_sights, sight_terms
 
 MIN_OCCURRENCES, MAX_MISSED, GROUP_SIZE, LOYALTY = 3, 5, 3, 0.7

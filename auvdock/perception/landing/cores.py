@@ -20,12 +20,12 @@ from auvdock.core.arrays import Array, Image, IntArray
 from auvdock.core.contracts import BLUE, RED, Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.constants import HALF_SCORE_SNR
 from auvdock.perception.components import peaked_components
 from auvdock.perception.spots import inside, mean_channel, noise_sigma
 
 __all__ = ["CoreCfg", "CoreDetector"]
 
-_SCORE_HALF_SNR = 10.0
 _HALO_PX = 12
 _BORDER_PX = 4
 
@@ -177,4 +177,4 @@ def _detections(image: Image, boxes: list[Array], centres: list[Array], snr: Arr
     ground = np.array([_median(loose, channel) for channel in range(3)])
     classes = np.array([_class(image[y0:y1, x0:x1], ground) for x0, y0, x1, y1 in around.tolist()], dtype=np.int64)
     strength = snr[order]
-    return Detections(xyxy, np.array(centres)[order], strength / (strength + _SCORE_HALF_SNR), classes)
+    return Detections(xyxy, np.array(centres)[order], strength / (strength + HALF_SCORE_SNR), classes)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array, Image
 from auvdock.core.contracts import Frame, RegionOfInterest, TagDetection
 from auvdock.core.errors import ConfigError
+from auvdock.numeric.constants import TAG_SQUARE_CELLS
 from auvdock.perception.landing.tag_edges import corners_from_lines, lines_through, refined_corners
 from auvdock.perception.solvers import homography
 
@@ -19,7 +20,6 @@ __all__ = ["TAG_DETECTORS", "AprilTagDetector", "ContourTagDetector", "TagDetect
 
 TAG_DETECTORS = ("apriltag", "contour")
 """Names of the tag detectors."""
-_CELLS = 8
 _CODE = 6
 _MIN_REGION_PX = 12
 _SMALL_PX = 120
@@ -152,14 +152,15 @@ class ContourTagDetector:
 
     def _read(self, grey: Image, quad: Array) -> tuple[int, int] | None:
         """(number, quarter turns) of the code within a quadrilateral, None if it is none of the family's."""
-        side = 6 * _CELLS
+        side = 6 * TAG_SQUARE_CELLS
         target = np.array([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]]) - 0.5
         warp = homography(quad, target)
         if warp is None:
             return None
         flat = cv2.warpPerspective(grey, warp, (side, side))
         level, _ = cv2.threshold(flat, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
-        cells = np.asarray(flat, dtype=np.float64).reshape(_CELLS, 6, _CELLS, 6)[:, 1:5, :, 1:5].mean(axis=(1, 3))
+        cells = np.asarray(flat, dtype=np.float64).reshape(TAG_SQUARE_CELLS, 6, TAG_SQUARE_CELLS, 6)
+        cells = cells[:, 1:5, :, 1:5].mean(axis=(1, 3))
         bits = (cells > level).astype(np.uint8)
         border = np.concatenate([bits[0], bits[-1], bits[1:-1, 0], bits[1:-1, -1]])
         if int(border.sum()) > 2:
@@ -200,10 +201,10 @@ def _grey(image: Image) -> Image:
 def _quadrilateral(contour: NDArray[np.int32]) -> Array | None:
     """(4, 2) corners of a contour that is a convex quadrilateral, clockwise in the image; None if it is none."""
     length = cv2.arcLength(contour, True)
-    if length < 4 * _CELLS:
+    if length < 4 * TAG_SQUARE_CELLS:
         return None
     quad = cv2.approxPolyDP(contour, 0.04 * length, True)
-    if len(quad) != 4 or not cv2.isContourConvex(quad) or abs(cv2.contourArea(quad)) < _CELLS**2:
+    if len(quad) != 4 or not cv2.isContourConvex(quad) or abs(cv2.contourArea(quad)) < TAG_SQUARE_CELLS**2:
         return None
     corners = np.asarray(quad, dtype=np.float64).reshape(4, 2)
     a, b = corners[1] - corners[0], corners[2] - corners[0]

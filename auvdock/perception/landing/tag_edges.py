@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array, BoolArray, Image
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Frame
+from auvdock.numeric.constants import TAG_SQUARE_CELLS
 
 __all__ = ["Lines", "corners_from_lines", "lines_through", "refined_corners"]
 
-_CELLS = 8
-"""Cells along a side of the black square: six of code and a border at each end."""
 _FROM, _TO = 0.08, 0.92
 """Part of each side that is used: blur rounds the corners."""
 _STEP_PX = 0.4
@@ -166,7 +165,7 @@ def _edge_points(patch: _Patch, corners: Array) -> tuple[Array, BoolArray] | Non
     along = side / length[:, None]
     # Clockwise in an image whose y points down: outwards is to the left of the way.
     outward = np.column_stack([along[:, 1], -along[:, 0]])
-    reach = min(max(0.7 * shortest / _CELLS, 1.5), 8.0)
+    reach = min(max(0.7 * shortest / TAG_SQUARE_CELLS, 1.5), 8.0)
     share = np.linspace(_FROM, _TO, int(min(max(longest / 1.5, 8.0), 60.0)))
     base = corners[:, None] + share[:, None] * side[:, None]
     offset = np.arange(-reach, reach + 0.5 * _STEP_PX, _STEP_PX)
