@@ -230,9 +230,8 @@ def motion(qpos: Array, qvel: Array, current: Array, gust: Array, out: Array) ->
     for i in range(MOTION):
         out[i] = 0.0
     rows = rotation_of_quat_wxyz(qpos[3], qpos[4], qpos[5], qpos[6])
-    out[0], out[1], out[2] = rows[0]
-    out[4], out[5], out[6] = rows[1]
-    out[8], out[9], out[10] = rows[2]
+    for i in range(3):
+        out[4 * i], out[4 * i + 1], out[4 * i + 2] = rows[i]
     out[3], out[7], out[11], out[15] = qpos[0], qpos[1], qpos[2], 1.0
     out[16], out[18] = math.atan2(out[9], out[10]), math.atan2(out[4], out[0])
     out[17] = -math.asin(max(-1.0, min(1.0, out[8])))
@@ -364,9 +363,8 @@ def wrench(
         z[6 + i] = z[i] * abs(z[i])
         z[12 + i] = s * z[i]
     turn = cross(p, q, r, u, v, w)
-    z[18] += turn[0]
-    z[19] += turn[1]
-    z[20] += turn[2]
+    for i in range(3):
+        z[18 + i] += turn[i]
     for i in range(len(state)):
         z[21 + i] = state[i] * immersion[5 + i]
         if actuators[2, i] < 0.0:

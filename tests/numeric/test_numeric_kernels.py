@@ -49,7 +49,7 @@ def made(tree):
 
 
 def is_kernel(node):
-    return isinstance(node, ast.FunctionDef) and any(
+    return any(
         isinstance(part, ast.Name) and part.id == "compiled" for mark in node.decorator_list for part in ast.walk(mark)
     )
 
@@ -78,7 +78,7 @@ def strangers(source):
     tree = ast.parse(source)
     origin, parts = imported(tree), made(tree)
     found = []
-    for kernel in filter(is_kernel, ast.walk(tree)):
+    for kernel in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and is_kernel(node)):
         open_names, seen = sorted(named(kernel)), set()
         while open_names:
             name = open_names.pop()
