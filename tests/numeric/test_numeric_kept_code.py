@@ -19,10 +19,11 @@ from auvdock.numeric.kept_code import KeptCodeWarning, examine_folder
 
 SOURCE = """
 from auvdock.numeric.compiled import compiled
+FACTOR = {factor}
 
 @compiled
 def raised(x):
-    return {factor} * x
+    return FACTOR * x
 """
 
 
@@ -78,7 +79,7 @@ def test_code_is_kept_beside_its_module_and_read_again(place):
 
 def test_code_of_another_source_is_left_without_a_word(place):
     called(place, factor=2.5)
-    # Only a constant differs: the byte code is the same.
+    # Only a constant of the file differs: the byte code is the same.
     assert called(place, factor=3.5)[1:] == (True, [])
 
 
