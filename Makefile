@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(PYTHON) -m pip --python $(BIN)/python --disable-pip-version-check install --quiet --constraint constraints.txt
 ARGS ?=
 
-.PHONY: dock test lint format wheel clean
+.PHONY: dock test lint tools check format wheel clean
 
 dock: $(BIN)/python
 	rm -rf build
@@ -17,8 +17,13 @@ test: $(BIN)/python
 	$(PIP) '.[test]'
 	$(BIN)/pytest --numprocesses auto $(ARGS)
 
-lint: $(BIN)/python
+lint: tools
+	$(MAKE) check
+
+tools: $(BIN)/python
 	$(PIP) --editable '.[dev]'
+
+check:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
@@ -33,7 +38,7 @@ wheel: $(BIN)/python
 	$(BIN)/python -m build
 
 clean:
-	rm -rf build dist .venv *.egg-info
+	rm -rf build dist .venv .lint *.egg-info
 
 # --without-pip: Debian's Python has venv but not ensurepip; the outer pip installs into the environment.
 $(BIN)/python:
