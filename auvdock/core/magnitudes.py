@@ -39,8 +39,8 @@ _GREATEST_COUNT = 1_000_000_000
 """Of whole numbers, which count something: lamps, pixels, frames, photons."""
 _GREATEST_OTHER = 1e15
 """Of other numbers: their products and squares stay finite."""
-_LEAST = 1e-12
-"""Of numbers that have a unit and are not 0, so that one over their squares is finite."""
+_LEAST = 1e-100
+"""Of numbers that have a unit and are not 0, so that one over their squares is finite; rounding leaves greater ones."""
 _NUMBERS = ("seed", "episode")
 """Whole numbers that name something instead of counting it."""
 _INDEX = re.compile(r"\[\d+\]$")

@@ -30,8 +30,10 @@ __all__ = ["Credibility", "CredibilityCfg"]
 
 _UNIT_FRAMES = 15.0
 """Length of the running mean of the noise (ours)."""
-_LEAST_UNIT, _GREATEST_UNIT = 0.16, 4.0
-"""Noise is taken for 0.4 times σ_px at least and for twice σ_px at most (ours)."""
+_LEAST_UNIT, _GREATEST_UNIT = 0.08, 2.0
+"""The mean is kept within these bounds, and ..."""
+_UNIT_MARGIN = 2.0
+"""... taken twice, since it is known from few frames: noise counts as 0.4 times σ_px at least, twice at most (ours)."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ class Credibility:
             return True
         along = step / length_m
         variance = self._noise_along(solution, along) + self._noise_along(before, along)
-        return excess_m**2 <= self._worst_step * unit_variance * variance
+        return excess_m**2 <= self._worst_step * _UNIT_MARGIN * unit_variance * variance
 
     def unit_variance_after(self, unit_variance: float, solution: PnpSolution) -> float:
         """What is known of the noise after one more pose: a running mean of χ² / (2 n - 6) (Mehra 1970), in bounds.

@@ -22,8 +22,8 @@ __all__ = ["SpatiotemporalAssociation"]
 
 _MAX_POSE_AGE = 10
 """Frames after which the last pose no longer helps to solve the next."""
-_MAX_STRAYED = 3
-"""Frames in a row whose pose is a step that the vehicle cannot have made, before the identities are doubted."""
+_MAX_DOUBTED = 10
+"""Frames in a row whose pose is not believed, though it reprojects well, before the identities are given up."""
 _MIN_LIT = 3
 _REACQUIRE = 0.15
 _REACQUIRE_PX = 2.0
@@ -33,9 +33,9 @@ class SpatiotemporalAssociation:
     """Keeps identities over time.
 
     Every frame: solve the pose from the lights that carry an identity; verify it; if it fails, drop the worst light,
-    and if that does not mend it, drop all identities and authenticate again in the same frame. A pose that is only too
-    far from the last one is none, and costs the identities if it happens four times in a row. Lights that appear where
-    a lost beacon must be are given its identity.
+    and if that does not mend it, drop all identities and authenticate again in the same frame. Where the lights
+    reproject well but the pose is not to be believed, there is none; the identities go if it lasts. Lights that appear
+    where a lost beacon must be are given its identity.
 
     A pose is `measured` when at least three authenticated beacons were detected in this frame. With four or more it
     rests on them alone; with three, the predicted positions of the others support it (weighted by their tracks'
@@ -79,7 +79,7 @@ class SpatiotemporalAssociation:
         self._age = 0
         self._way_m: Array = np.zeros(3)
         self._unit_variance = 1.0
-        self._strayed = 0
+        self._doubted = 0
 
     def update(
         self,
@@ -128,35 +128,38 @@ class SpatiotemporalAssociation:
             if count < _MIN_LIT:
                 tracks.beacon_id[:] = -1
             return None
-        solution = self._verified(lights, seen, prior)
+        solution = self._solved(lights, seen, prior)
         if seen == _MIN_LIT < count and (solution is None or solution.cost > self._credibility.expected_cost(count)):
             there = lights[:, SEEN] > 0.0
-            alone = self._verified(lights[there], seen, prior)
-            if alone is not None:
+            alone = self._solved(lights[there], seen, prior)
+            if alone is not None and self._is_believed(alone):
                 solution, owners = alone, owners[there]
-        if seen >= 5 and (solution is None or not self._follows(solution)):
+        believed = solution is not None and self._is_believed(solution)
+        if seen >= 5 and not believed:
             better, rest = self._without_worst(tracks, lights, owners, prior)
             if better is not None:
-                solution, owners, seen = better, rest, len(rest)
-        if solution is None:
-            tracks.beacon_id[:] = -1
-            return None
-        if not self._follows(solution):
-            self._strayed += 1
-            if self._strayed <= _MAX_STRAYED:
+                solution, owners, seen, believed = better, rest, len(rest), True
+        if not believed:
+            self._doubted += 1
+            if solution is not None and self._doubted <= _MAX_DOUBTED:
                 return Associated()
             tracks.beacon_id[:] = -1
+        if solution is None or not believed:
             return None
-        self._strayed = 0
+        self._doubted = 0
         ids = tuple(owners[:, 1].tolist())
         return Associated(pose_estimate(solution, ids, seen >= _MIN_LIT), seen, solution)
 
-    def _verified(self, lights: Array, seen: int, prior: Array) -> PnpSolution | None:
+    def _solved(self, lights: Array, seen: int, prior: Array) -> PnpSolution | None:
         """The pose of the given lights if those of them that were seen reproject well."""
         solution = self._solver.solve_lights(lights, prior, self._last)
         if solution is None or (seen and solution.error_px > self._pnp.max_reprojection_px):
             return None
-        return solution if self._credibility.holds(solution) else None
+        return solution
+
+    def _is_believed(self, solution: PnpSolution) -> bool:
+        """Whether a pose can be right, by itself and after the last one that was."""
+        return self._credibility.holds(solution) and self._follows(solution)
 
     def _follows(self, solution: PnpSolution) -> bool:
         """Whether a pose can come after the last one that was believed."""
@@ -172,8 +175,8 @@ class SpatiotemporalAssociation:
         best: PnpSolution | None = None
         left_out = 0
         for index in range(len(lights)):
-            solution = self._verified(np.delete(lights, index, axis=0), len(lights) - 1, prior)
-            if solution is None or not self._follows(solution):
+            solution = self._solved(np.delete(lights, index, axis=0), len(lights) - 1, prior)
+            if solution is None or not self._is_believed(solution):
                 continue
             if best is None or solution.error_px < best.error_px:
                 best, left_out = solution, index
@@ -230,9 +233,7 @@ class SpatiotemporalAssociation:
 
     def _likely(self, solution: PnpSolution, identity: IntArray, pixels: Array, others_px: Array) -> bool:
         """Whether new identities hold: a good fit, and far likelier than spurious lights in those places."""
-        if solution.error_px > self._pnp.max_reprojection_px or not self._credibility.holds(solution):
-            return False
-        if not self._follows(solution):
+        if solution.error_px > self._pnp.max_reprojection_px or not self._is_believed(solution):
             return False
         unused = np.setdiff1d(np.arange(len(self._blue_m)), np.flatnonzero(identity >= 0))
         others_px = np.vstack([np.delete(pixels, identity[identity >= 0], axis=0), others_px])

@@ -34,7 +34,7 @@ def test_what_has_a_unit_is_nothing_or_something():
     check_magnitude("start.lateral_m", 0.0)
     check_magnitude("start.lateral_m", -1e-12)
     check_magnitude("surround_factor", 2e-15)
-    with pytest.raises(ConfigError, match="at least 1e-12 m"):
+    with pytest.raises(ConfigError, match="at least 1e-100 m"):
         check_magnitude("start.lateral_m", 5e-324)
 
 

@@ -263,21 +263,21 @@ def test_comparison_rejects_a_stray_by_ransac():
     assert position_error_m(percept, run.truth) < 0.6
 
 
-def test_predicted_places_that_disagree_with_what_is_seen_make_no_false_pose():
-    """Strays draw three beacons' tracks 4 px aside in one frame, then only the other three beacons are seen.
+def test_predicted_places_that_disagree_with_what_is_seen_are_left_out():
+    """Strays draw three beacons' tracks 3 px aside in one frame, then only the other three beacons are seen.
 
-    Twelve approaches at 6 m with 0.05 px of noise: what pose there is lies within 0.3 m. With the drawn predictions the
-    median was 0.4 m off.
+    Eight approaches at 9 m with 0.05 px of noise: the pose rests on those three and the attitude, within 0.1 m. With the
+    drawn predictions it was 0.7 to 0.8 m off.
     """
-    for seed in range(12):
-        run = Run(seed, sigma_px=0.05)
-        before = run.repeat(20)
-        assert before.pose is not None
-        beside = np.array([[4.0, 0.0], [0.0, 4.0], [-4.0, 0.0]])
+    for seed in range(8):
+        run = Run(seed, motion=approach(9.0), sigma_px=0.05)
+        run.repeat(20)
+        beside = np.array([[3.0, 0.0], [0.0, 3.0], [-3.0, 0.0]])
         run.show(hidden=(3, 4, 5), extra=pixels_of(run.motion.at(run.frame / 30.0)[0], RING[3:]) + beside)
         percept = run.show(hidden=(3, 4, 5))
-        assert percept.pose is None or position_error_m(percept, run.truth) < 0.3
-        assert run.repeat(4).pose is not None
+        assert percept.pose is not None
+        assert percept.pose.measured
+        assert position_error_m(percept, run.truth) < 0.1
 
 
 def test_comparison_scores_valid_now_or_holds_the_last():
