@@ -266,8 +266,8 @@ def test_comparison_rejects_a_stray_by_ransac():
 def test_predicted_places_that_disagree_with_what_is_seen_are_left_out():
     """Strays draw three beacons' tracks 3 px aside in one frame, then only the other three beacons are seen.
 
-    Eight approaches at 9 m with 0.05 px of noise: the pose rests on those three and the attitude, within 0.1 m. With the
-    drawn predictions it was 0.7 to 0.8 m off.
+    Eight approaches at 9 m with 0.05 px of noise: the pose rests on those three and the attitude, within 0.1 m. With
+    the drawn predictions it was 0.7 to 0.8 m off.
     """
     for seed in range(8):
         run = Run(seed, motion=approach(9.0), sigma_px=0.05)
