@@ -53,8 +53,9 @@ class CredibilityCfg:
     the camera, acceleration since the last pose (ours)."""
     detection_probability: float = 0.9
     """Share of the beacons in view that a detector finds, for the odds of a new identification."""
-    min_log_odds: float = 10.0
-    """Least natural logarithm of (probability of these lights if they are the beacons, over that if they are not)."""
+    min_log_odds: float = 6.9
+    """Least natural logarithm of (probability of these lights if they are the beacons, over that if they are not): a
+    thousand to one, as in a landing."""
 
     def __post_init__(self) -> None:
         """Refuse what no check can use."""

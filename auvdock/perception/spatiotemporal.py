@@ -22,7 +22,7 @@ __all__ = ["SpatiotemporalAssociation"]
 
 _MAX_POSE_AGE = 10
 """Frames after which the last pose no longer helps to solve the next."""
-_MAX_DOUBTED = 10
+_MAX_DOUBTED = 3
 """Frames in a row whose pose is not believed, though it reprojects well, before the identities are given up."""
 _MIN_LIT = 3
 _REACQUIRE = 0.15
