@@ -7,7 +7,9 @@ at any range, and among a dozen spurious lights some four lie like four of six b
 2. its range: the standard deviation along the line of sight, σ_r, must be a small share of the range, and no lamp is
    seen farther away than its light reaches;
 3. its step from the last pose: no farther off the vehicle's way than the noise of both poses explains;
-4. chance: identities that are handed out anew must be far likelier than spurious lights in those places. That is the
+4. its mirror image: a plane seen from afar has two poses, and where nobody knows the heading of the station, light
+   alone must tell which it is (Schweighofer & Pinz 2006);
+5. chance: identities that are handed out anew must be far likelier than spurious lights in those places. That is the
    score of multiple-hypothesis tracking (Reid 1979; Blackman & Popoli 1999, section 6.2), with the pose, which nobody
    knows beforehand, integrated out by Laplace's approximation.
 """
@@ -51,6 +53,9 @@ class CredibilityCfg:
     speed_error_m_s: float = 0.5
     """The vehicle's way between two poses is known by its DVL to this speed: its noise, the hull's turning, which moves
     the camera, acceleration since the last pose (ours)."""
+    mirror_log_odds: float = 6.9
+    """Where the station's heading is not known: least natural logarithm of how much likelier a pose is than the other
+    pose of the lights' plane; a thousand to one."""
     detection_probability: float = 0.9
     """Share of the beacons in view that a detector finds, for the odds of a new identification."""
     min_log_odds: float = 6.9
@@ -62,7 +67,7 @@ class CredibilityCfg:
         for name in ("fit_probability", "detection_probability"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ConfigError(name, getattr(self, name), "a probability above 0 and below 1")
-        for name in ("max_range_sigma", "max_range_sigma_m", "max_range_m", "speed_error_m_s"):
+        for name in ("max_range_sigma", "max_range_sigma_m", "max_range_m", "speed_error_m_s", "mirror_log_odds"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(name, getattr(self, name), "a value above 0")
 
@@ -93,14 +98,22 @@ class Credibility:
         self._log_volume = math.log(width * height * cfg.max_range_m**3 / 3.0)
         self._area_px = float(camera.width_px * camera.height_px)
 
-    def holds(self, solution: PnpSolution) -> bool:
-        """Whether fit, σ_r and range are those of a right pose."""
+    def holds(self, solution: PnpSolution, heading_known: bool = True) -> bool:
+        """Whether fit, σ_r and range are those of a right pose.
+
+        Across the line of sight the attitude prior bounds the error. Where the heading is not known, light alone does,
+        and twice the greatest σ of the position counts in place of σ_r.
+        """
         cfg = self._cfg
         position = solution.T_station_camera()[:3, 3]
         range_m = math.sqrt(float(position @ position))
         if solution.cost > self._worst_fit[len(solution.residual_px)] or range_m > cfg.max_range_m:
             return False
-        variance = float(position @ solution.covariance()[:3, :3] @ position) / range_m**2
+        covariance = solution.covariance()[:3, :3]
+        if heading_known:
+            variance = float(position @ covariance @ position) / range_m**2
+        else:
+            variance = 4.0 * float(np.linalg.eigvalsh(covariance)[-1])
         return variance <= max(cfg.max_range_sigma_m, cfg.max_range_sigma * range_m) ** 2
 
     def expected_cost(self, lights: int) -> float:
@@ -131,6 +144,23 @@ class Credibility:
         along = step / length_m
         variance = self._noise_along(solution, along) + self._noise_along(before, along)
         return excess_m**2 <= self._worst_step * _UNIT_MARGIN * unit_variance * variance
+
+    def is_alone(self, solution: PnpSolution, mirrored: PnpSolution | None, unit_variance: float = 1.0) -> bool:
+        """Whether a pose is far likelier than the other pose of its plane, or both are one.
+
+        Args:
+            solution: the pose.
+            mirrored: the other one, see `PnpSolver.mirrored`.
+            unit_variance: of the lights' noise over what σ_px says, see `unit_variance_after`.
+        """
+        if mirrored is None:
+            return True
+        position = solution.T_station_camera()[:3, 3]
+        apart_m = float(np.linalg.norm(mirrored.T_station_camera()[:3, 3] - position))
+        if apart_m <= max(self._cfg.max_range_sigma_m, self._cfg.max_range_sigma * float(np.linalg.norm(position))):
+            return True
+        scale = min(_UNIT_MARGIN * unit_variance, 1.0)
+        return mirrored.cost - solution.cost >= 2.0 * self._cfg.mirror_log_odds * scale
 
     def unit_variance_after(self, unit_variance: float, solution: PnpSolution) -> float:
         """What is known of the noise after one more pose: a running mean of χ² / (2 n - 6) (Mehra 1970), in bounds.

@@ -32,7 +32,7 @@ from auvdock.numeric.lights import (
     TRANSFORM,
     TRANSLATION,
 )
-from auvdock.numeric.rotations import vector_of
+from auvdock.numeric.rotations import rotation_of, vector_of
 from auvdock.perception.pnp_refine import solve_from
 from auvdock.perception.solvers import project, solve_pnp
 
@@ -189,6 +189,34 @@ class PnpSolver:
         if start is None:
             return None
         return self._refine(_pose(*start), light_table(points_m, pixels, sigma_px), rotation_prior, "plain")
+
+    def mirrored(self, solution: PnpSolution, lights: Array, rotation_prior: Array) -> PnpSolution | None:
+        """The other pose of a plane (Schweighofer & Pinz 2006), refined from the mirror image of a solution.
+
+        Seen from afar, a plane turned by θ about an axis across the line of sight looks like one turned by -θ: R' =
+        exp(2 θ a) R, about the lights' centre, with a the unit vector of n × l, n the array's normal away from the
+        camera and l the line of sight to its centre.
+
+        Args:
+            solution: pose of lights that lie more or less in a plane across the station's x axis.
+            lights: (n, 7) their table, see `light_table`.
+            rotation_prior: as in `solve`.
+
+        Returns:
+            That pose, which may be the solution itself, or None where there is none.
+        """
+        middle = lights[:, :PIXEL].mean(axis=0)
+        centre = solution.rotation @ middle + solution.translation_m
+        sight, normal = centre / np.linalg.norm(centre), -solution.rotation[:, 0]
+        across = np.asarray(np.cross(normal, sight), dtype=np.float64)
+        sine = float(np.linalg.norm(across))
+        if sine == 0.0:
+            return solution
+        angle = 2.0 * math.atan2(sine, float(normal @ sight))
+        turn = rotation_of(across * (angle / sine))
+        rotation = turn @ solution.rotation
+        start = _pose(vector_of(rotation), centre - rotation @ middle)
+        return self._refine(start, lights, rotation_prior, solution.solver)
 
     def project(self, solution: PnpSolution, points_m: Array) -> Array:
         """(k, 2) pixels of station points (k, 3) under a solution."""

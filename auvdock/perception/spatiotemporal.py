@@ -34,8 +34,8 @@ class SpatiotemporalAssociation:
 
     Every frame: solve the pose from the lights that carry an identity; verify it; if it fails, drop the worst light,
     and if that does not mend it, drop all identities and authenticate again in the same frame. Where the lights
-    reproject well but the pose is not to be believed, there is none; the identities go if it lasts. Lights that appear
-    where a lost beacon must be are given its identity.
+    reproject well but the pose is not to be believed, there is none; the identities go if it lasts. They stay where two
+    poses are about as likely. Lights that appear where a lost beacon must be are given its identity.
 
     A pose is `measured` when at least three authenticated beacons were detected in this frame. With four or more it
     rests on them alone; with three, the predicted positions of the others support it (weighted by their tracks'
@@ -70,6 +70,7 @@ class SpatiotemporalAssociation:
         self._solver = PnpSolver(pnp, camera)
         self._credibility = Credibility(credibility, camera, self._blue_m, math.radians(pnp.attitude_prior_sigma_deg))
         self._min_log_odds = credibility.min_log_odds
+        self._attitude_sigma_rad = math.radians(pnp.attitude_sigma_deg)
         self.reset()
 
     def reset(self) -> None:
@@ -80,6 +81,7 @@ class SpatiotemporalAssociation:
         self._way_m: Array = np.zeros(3)
         self._unit_variance = 1.0
         self._doubted = 0
+        self._heading_known = True
 
     def update(
         self,
@@ -91,6 +93,7 @@ class SpatiotemporalAssociation:
     ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`."""
         self._solver.heading_sigma_rad = heading_sigma_rad
+        self._heading_known = heading_sigma_rad is None or heading_sigma_rad <= self._attitude_sigma_rad
         self._age += 1
         self._way_m = rotation_prior.T @ velocity_m_s * (self._age / self._rate_hz)
         if self._age > _MAX_POSE_AGE:
@@ -133,11 +136,12 @@ class SpatiotemporalAssociation:
             there = lights[:, SEEN] > 0.0
             alone = self._solved(lights[there], seen, prior)
             if alone is not None and self._is_believed(alone):
-                solution, owners = alone, owners[there]
+                solution, owners, lights = alone, owners[there], lights[there]
         believed = solution is not None and self._is_believed(solution)
         if seen >= 5 and not believed:
             better, rest = self._without_worst(tracks, lights, owners, prior)
             if better is not None:
+                lights = lights[np.isin(owners[:, 1], rest[:, 1])]
                 solution, owners, seen, believed = better, rest, len(rest), True
         if not believed:
             self._doubted += 1
@@ -147,6 +151,12 @@ class SpatiotemporalAssociation:
         if solution is None or not believed:
             return None
         self._doubted = 0
+        if not self._heading_known:
+            solution, is_alone = self._likelier(solution, lights, prior)
+            if not is_alone:
+                self._last, self._believed, self._age = solution, None, 0
+                self._unit_variance = self._credibility.unit_variance_after(self._unit_variance, solution)
+                return Associated()
         ids = tuple(owners[:, 1].tolist())
         return Associated(pose_estimate(solution, ids, seen >= _MIN_LIT), seen, solution)
 
@@ -159,7 +169,7 @@ class SpatiotemporalAssociation:
 
     def _is_believed(self, solution: PnpSolution) -> bool:
         """Whether a pose can be right, by itself and after the last one that was."""
-        return self._credibility.holds(solution) and self._follows(solution)
+        return self._credibility.holds(solution, self._heading_known) and self._follows(solution)
 
     def _follows(self, solution: PnpSolution) -> bool:
         """Whether a pose can come after the last one that was believed."""
@@ -167,6 +177,13 @@ class SpatiotemporalAssociation:
         return before is None or self._credibility.follows(
             solution, before, self._way_m, elapsed_s, self._unit_variance
         )
+
+    def _likelier(self, solution: PnpSolution, lights: Array, prior: Array) -> tuple[PnpSolution, bool]:
+        """The likelier of a pose and the other one of its plane, and whether it is so by far."""
+        other = self._solver.mirrored(solution, lights, prior)
+        if other is not None and other.cost < solution.cost:
+            solution, other = other, solution
+        return solution, self._credibility.is_alone(solution, other, self._unit_variance)
 
     def _without_worst(
         self, tracks: LightTracker, lights: Array, owners: IntArray, prior: Array
