@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.controllers.planar_groups import add_planar, beyond_dead_band, least_planar, longest, planar_groups
 from auvdock.core.arrays import Array, check_shape
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import Positive, between
 from auvdock.core.vehicle import VehicleCfg
 
 __all__ = ["AllocationCfg", "ThrustAllocator"]
@@ -19,23 +21,19 @@ _TINY = 1e-9
 _WIDTH = 10
 """Columns of the table of planar groups."""
 
+Preload = Annotated[float, between(0.0, 0.5)]
+"""Part of a thruster's range that it may push against another one."""
+
 
 @dataclass(frozen=True)
-class AllocationCfg:
+class AllocationCfg(Checked):
     """How thrusters and fins share the work."""
 
-    fin_weight: float = 0.1
+    fin_weight: Positive = 0.1
     """Cost of a fin's squared command against a thruster's 1: a fin costs next to no energy."""
-    preload: float = 0.0
+    preload: Preload = 0.0
     """Command with which opposed vectored thrusters push against each other, so that a weak wrench does not fall into
     their dead bands; 0 for none. Groups with fins, or without redundant thrusters, have none."""
-
-    def __post_init__(self) -> None:
-        """The weight divides; the preload leaves room to work."""
-        if not self.fin_weight > 0.0:
-            raise ConfigError("fin_weight", self.fin_weight, "a weight above 0")
-        if not 0.0 <= self.preload <= 0.5:
-            raise ConfigError("preload", self.preload, "a command of 0 to 0.5")
 
 
 class ThrustAllocator:

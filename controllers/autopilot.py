@@ -12,56 +12,39 @@ from auvdock.controllers.control_law import body_wrench, near
 from auvdock.controllers.gains import AutopilotGains, DesignCfg, design_gains
 from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Proprioception
-from auvdock.core.errors import ConfigError, located
+from auvdock.core.errors import located
+from auvdock.core.limits import Positive, PositiveShare
 from auvdock.core.vehicle import VehicleCfg
 
 __all__ = ["Autopilot", "AutopilotCfg", "AutopilotSetpoint", "AutopilotState"]
 
 
 @dataclass(frozen=True)
-class AutopilotCfg:
+class AutopilotCfg(Checked):
     """Limits of the autopilot; its gains follow from `design`."""
 
     design: DesignCfg = DesignCfg()
     """What the loops shall achieve."""
-    surge_acceleration_m_s2: float = 0.25
+    surge_acceleration_m_s2: Positive = 0.25
     """Fastest change of the surge reference."""
-    sway_acceleration_m_s2: float = 0.15
+    sway_acceleration_m_s2: Positive = 0.15
     """Fastest change of the sway and heave references."""
-    max_heave_m_s: float = 0.3
+    max_heave_m_s: Positive = 0.3
     """Greatest vertical speed that the depth loop asks for."""
-    max_heading_error_rad: float = 0.6
+    max_heading_error_rad: Positive = 0.6
     """Heading and pitch errors beyond this count as this much: large turns run at a bounded rate."""
-    integral_zone_rad: float = 0.15
+    integral_zone_rad: Positive = 0.15
     """Heading and pitch errors beyond this are not integrated (integral separation): a turn leaves no overshoot."""
-    max_speed_error_m_s: float = 0.4
+    max_speed_error_m_s: Positive = 0.4
     """The shaped speed references stay this close to the measured speed: they do not run away from a saturated hull."""
-    force_share: float = 0.85
+    force_share: PositiveShare = 0.85
     """Part of an axis' thrust that its force loop may use; the rest of shared thrusters is left to the moments."""
-    moment_share: float = 0.95
+    moment_share: PositiveShare = 0.95
     """Part of an axis' greatest moment that its loop may use."""
-    current_time_constant_s: float = 2.0
+    current_time_constant_s: Positive = 2.0
     """Smoothing of the measured water velocity for feed-forward."""
-
-    def __post_init__(self) -> None:
-        """All are positive, shares at most 1."""
-        for name in (
-            "surge_acceleration_m_s2",
-            "sway_acceleration_m_s2",
-            "max_heave_m_s",
-            "max_heading_error_rad",
-            "integral_zone_rad",
-            "max_speed_error_m_s",
-            "force_share",
-            "moment_share",
-            "current_time_constant_s",
-        ):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a value above 0")
-        for name in ("force_share", "moment_share"):
-            if getattr(self, name) > 1.0:
-                raise ConfigError(name, getattr(self, name), "a share of at most 1")
 
 
 class AutopilotSetpoint(NamedTuple):

@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 from auvdock.controllers.linear_model import AxisPlant, axis_plants
 from auvdock.controllers.pid import PidGains
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import below, between
 from auvdock.core.vehicle import VehicleCfg
 
 __all__ = [
     "AutopilotGains",
+    "Crossover",
     "DesignCfg",
     "LoopDesign",
+    "PhaseMargin",
     "cascade_design",
     "design_gains",
     "loop_margins",
@@ -23,30 +27,35 @@ __all__ = [
     "rolls",
 ]
 
+Crossover = Annotated[float, between(0.01, 10.0)]
+"""Gain crossover of a loop, rad/s."""
+PhaseMargin = Annotated[float, below(90.0)]
+"""Phase margin of a loop, degrees."""
+
 
 @dataclass(frozen=True)
-class DesignCfg:
+class DesignCfg(Checked):
     """What the loops shall achieve; gains follow from it and from the vehicle."""
 
     surge_m_s: float = 0.5
     """Speed through the water at which the vehicle is linearised: paper A's approach speed."""
-    surge_crossover_rad_s: float = 1.0
+    surge_crossover_rad_s: Crossover = 1.0
     """Gain crossover of the surge speed loop."""
-    sway_crossover_rad_s: float = 1.2
+    sway_crossover_rad_s: Crossover = 1.2
     """Gain crossover of the sway velocity loop."""
-    heave_crossover_rad_s: float = 1.2
+    heave_crossover_rad_s: Crossover = 1.2
     """Gain crossover of the heave velocity loop."""
-    pitch_crossover_rad_s: float = 2.0
+    pitch_crossover_rad_s: Crossover = 2.0
     """Gain crossover of the pitch loop."""
-    heading_crossover_rad_s: float = 1.8
+    heading_crossover_rad_s: Crossover = 1.8
     """Gain crossover of the heading loop."""
-    roll_crossover_rad_s: float = 2.0
+    roll_crossover_rad_s: Crossover = 2.0
     """Gain crossover of the roll loop, where thrusters act on roll."""
-    depth_crossover_rad_s: float = 0.35
+    depth_crossover_rad_s: Crossover = 0.35
     """Gain crossover of the depth loop, which gives the heave loop its set-point."""
-    velocity_margin_deg: float = 65.0
+    velocity_margin_deg: PhaseMargin = 65.0
     """Phase margin for which the velocity loops are designed."""
-    attitude_margin_deg: float = 52.0
+    attitude_margin_deg: PhaseMargin = 52.0
     """Phase margin for which the attitude loops are designed."""
     integral_ratio: float = 0.1
     """Integral over proportional action of the attitude loops at crossover: k_i = ratio × ω_c × k_p."""
@@ -56,13 +65,9 @@ class DesignCfg:
     """Phase margin below which a design is refused."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be designed for."""
-        for axis in ("surge", "sway", "heave", "roll", "pitch", "heading", "depth"):
-            name = f"{axis}_crossover_rad_s"
-            if not 0.01 <= getattr(self, name) <= 10.0:
-                raise ConfigError(name, getattr(self, name), "a crossover of 0.01 to 10 rad/s")
+        """Refuse to design for a margin below the least."""
         for name in ("velocity_margin_deg", "attitude_margin_deg"):
-            if not self.min_phase_margin_deg <= getattr(self, name) < 90.0:
+            if getattr(self, name) < self.min_phase_margin_deg:
                 raise ConfigError(name, getattr(self, name), "a phase margin of min_phase_margin_deg up to 90")
 
 

@@ -14,7 +14,8 @@ from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.linear_model import hydrodynamic_wrench
 from auvdock.controllers.modes import ModeCfg
 from auvdock.core.arrays import Array
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import NotNegative, Positive
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.scalars import limited
@@ -39,70 +40,61 @@ _MAX_CRAB, _MAX_ENTRY_CRAB, _VIEW, _REACH, _DT = 19, 20, 21, 22, 23
 
 
 @dataclass(frozen=True)
-class GuidanceCfg:
+class GuidanceCfg(Checked):
     """Speeds, lookahead and corridor of the approach."""
 
-    far_speed_m_s: float = 0.9
+    far_speed_m_s: Positive = 0.9
     """Speed over ground towards the long-range lamp."""
-    mid_speed_m_s: float = 0.5
+    mid_speed_m_s: Positive = 0.5
     """Speed over ground on the axis with a pose (paper A: 0.5 m/s)."""
-    entry_speed_m_s: float = 0.5
+    entry_speed_m_s: Positive = 0.5
     """Speed over ground through mouth and throat."""
-    tube_speed_m_s: float = 0.3
+    tube_speed_m_s: Positive = 0.3
     """Speed over ground past the throat, where the latch will catch the vehicle."""
-    back_speed_m_s: float = 0.4
+    back_speed_m_s: Positive = 0.4
     """Speed over ground while backing off."""
-    fast_beyond_m: float = 8.0
+    fast_beyond_m: Positive = 8.0
     """With a pose, farther from the mouth than this the speed rises towards `far_speed_m_s`."""
-    cross_speed_m_s: float = 0.5
+    cross_speed_m_s: Positive = 0.5
     """Speed U of the cross-track law: the vehicle moves across the axis at U sin χ."""
-    max_cross_speed_m_s: float = 0.3
+    max_cross_speed_m_s: Positive = 0.3
     """Greatest speed across the axis."""
-    lookahead_mid_m: float = 1.8
+    lookahead_mid_m: Positive = 1.8
     """Lookahead Δ with a pose."""
-    lookahead_near_m: float = 1.2
+    lookahead_near_m: Positive = 1.2
     """Lookahead Δ at the mouth."""
-    integral_gain: float = 0.08
+    integral_gain: NotNegative = 0.08
     """σ of the integral line of sight, in 1/s against an integral in m s; 0 turns integral action off."""
-    assumed_range_m: float = 15.0
+    assumed_range_m: Positive = 15.0
     """Range at which the long-range lamp's height above the axis is allowed for while no range is known."""
-    sight_smoothing: float = 0.08
+    sight_smoothing: Positive = 0.08
     """Weight of a new bearing against the smoothed one: 0.08 at 30 Hz averages over some 0.4 s."""
-    max_vertical_speed_m_s: float = 0.3
+    max_vertical_speed_m_s: Positive = 0.3
     """Greatest vertical speed towards a bearing."""
-    corridor_m: float = 0.3
+    corridor_m: Positive = 0.3
     """Allowed distance from the axis at the mouth and up to `corridor_from_m` before it."""
-    corridor_from_m: float = 3.0
+    corridor_from_m: Positive = 3.0
     """Where the corridor begins to widen."""
-    corridor_slope: float = 0.35
+    corridor_slope: Positive = 0.35
     """How fast it widens with distance."""
-    sway_share: float = 0.8
+    sway_share: Positive = 0.8
     """Part of the lateral actuators' range that may go into holding against a cross-current before the hull crabs."""
-    max_crab_rad: float = 0.5
+    max_crab_rad: Positive = 0.5
     """Greatest crab angle up to the mouth."""
-    max_entry_crab_rad: float = 0.08
+    max_entry_crab_rad: Positive = 0.08
     """Greatest crab angle at the throat; the latch allows 10°."""
-    straighten_rad_m: float = 0.25
+    straighten_rad_m: Positive = 0.25
     """How fast the crab angle falls along the last way in."""
-    straight_share: float = 0.4
+    straight_share: Positive = 0.4
     """Part of the funnel after which the hull shall be straight."""
-    rush_speed_m_s: float = 0.85
+    rush_speed_m_s: Positive = 0.85
     """Speed over ground through the mouth in a cross-current beyond the sway thrusters' reach."""
-    min_way_m_s: float = 0.35
+    min_way_m_s: Positive = 0.35
     """Least forward speed on the axis in such a current, outside the corridor too."""
-    rush_excess_m_s: float = 0.15
+    rush_excess_m_s: Positive = 0.15
     """Cross-current beyond reach at which the speed is risen to that."""
-    max_view_angle_rad: float = 0.5
+    max_view_angle_rad: Positive = 0.5
     """The hull turns towards the mouth as far as needed to keep it within this angle of the bow."""
-
-    def __post_init__(self) -> None:
-        """All are positive, but for the integral gain."""
-        for name, value in vars(self).items():
-            if name == "integral_gain":
-                if value < 0.0:
-                    raise ConfigError(name, value, "a gain of 0 or more")
-            elif not value > 0.0:
-                raise ConfigError(name, value, "a value above 0")
 
 
 def axis_law(cfg: GuidanceCfg, modes: ModeCfg, funnel_length_m: float, reach_m_s: float, dt_s: float) -> Array:

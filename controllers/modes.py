@@ -25,7 +25,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, Positive
 
 __all__ = [
     "ABORT",
@@ -58,57 +60,54 @@ TRANSITIONS: dict[str, frozenset[str]] = {
 
 
 @dataclass(frozen=True)
-class ModeCfg:
+class ModeCfg(Checked):
     """Thresholds of the mode machine."""
 
-    confirm_sights: int = 3
+    confirm_sights: Count = 3
     """Frames in a row with the long-range light before far begins."""
-    confirm_fixes: int = 5
+    confirm_fixes: Count = 5
     """Accepted poses before mid begins."""
-    fresh_s: float = 0.5
+    fresh_s: Positive = 0.5
     """A pose is fresh this long."""
-    sight_lost_s: float = 3.0
+    sight_lost_s: Positive = 3.0
     """Far ends when no light was seen for this long."""
-    far_timeout_s: float = 90.0
+    far_timeout_s: Positive = 90.0
     """Longest far: a lamp that leads on for longer is none."""
-    min_blind_range_m: float = 3.0
+    min_blind_range_m: Positive = 3.0
     """Far is aborted when the lights seem nearer than this and no pose has come."""
-    pose_lost_s: float = 4.0
+    pose_lost_s: Positive = 4.0
     """Mid dead-reckons this long without a pose."""
-    commit_distance_m: float = 4.5
+    commit_distance_m: Positive = 4.5
     """Nearer than this, trouble in mid means backing off."""
-    gate_distance_m: float = 3.0
+    gate_distance_m: Positive = 3.0
     """Where corridor and heading are judged before the vehicle commits itself."""
-    gate_heading_rad: float = 0.14
+    gate_heading_rad: Positive = 0.14
     """Greatest relative heading at the gate, crab angle apart."""
-    hold_s: float = 10.0
+    hold_s: Positive = 10.0
     """Longest wait at the gate for the corridor."""
-    mid_timeout_s: float = 90.0
+    mid_timeout_s: Positive = 90.0
     """Longest mid."""
-    max_sigma_m: float = 0.25
+    max_sigma_m: Positive = 0.25
     """Greatest uncertainty across the axis in near."""
-    mouth_m: float = 0.2
+    mouth_m: Positive = 0.2
     """Terminal begins with the nose this far before the mouth."""
-    stall_s: float = 5.0
+    stall_s: Positive = 5.0
     """Near and terminal: no progress along the axis for this long means stuck."""
-    progress_m: float = 0.05
+    progress_m: Positive = 0.05
     """Smaller advances do not count as progress."""
-    terminal_timeout_s: float = 25.0
+    terminal_timeout_s: Positive = 25.0
     """Longest terminal."""
-    standoff_m: float = 7.0
+    standoff_m: Positive = 7.0
     """Abort backs off to here."""
-    back_timeout_s: float = 30.0
+    back_timeout_s: Positive = 30.0
     """Longest backing off."""
-    blind_back_s: float = 8.0
+    blind_back_s: Positive = 8.0
     """Backing off when the place before the station is unknown."""
-    max_attempts: int = 3
+    max_attempts: Count = 3
     """Approaches before the pilot gives up."""
 
     def __post_init__(self) -> None:
-        """All are positive; the gate lies between mouth and standoff."""
-        for name, value in vars(self).items():
-            if not value > 0:
-                raise ConfigError(name, value, "a value above 0")
+        """The gate lies between mouth and standoff."""
         if not self.mouth_m < self.gate_distance_m <= self.commit_distance_m < self.standoff_m:
             raise ConfigError(
                 "gate_distance_m",

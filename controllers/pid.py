@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import NotNegative
 
 __all__ = ["PidGains"]
 
 
 @dataclass(frozen=True)
-class PidGains:
+class PidGains(Checked):
     """Parallel form: τ = k_p e + k_i ∫ e dt − k_d ẏ."""
 
-    kp: float
-    ki: float = 0.0
-    kd: float = 0.0
-
-    def __post_init__(self) -> None:
-        """All gains are 0 or more."""
-        for name in ("kp", "ki", "kd"):
-            if not getattr(self, name) >= 0.0:
-                raise ConfigError(name, getattr(self, name), "a gain of 0 or more")
+    kp: NotNegative
+    ki: NotNegative = 0.0
+    kd: NotNegative = 0.0

@@ -40,6 +40,7 @@ from auvdock.controllers.steering import (
     towards_light,
 )
 from auvdock.core.camera import Camera
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Bearing, Command, Percept, Proprioception
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.vehicle import VehicleCfg
@@ -62,7 +63,7 @@ class Pilot(Protocol[S]):
 
 
 @dataclass(frozen=True)
-class ControlCfg:
+class ControlCfg(Checked):
     """Everything that can be set about the pilot."""
 
     autopilot: AutopilotCfg = field(default_factory=AutopilotCfg)

@@ -16,8 +16,9 @@ import numpy as np
 from auvdock.controllers.relative_update import ACCEPTED, LEFT_OUT, REFUSED, relative_period
 from auvdock.controllers.senses import Senses, Vector
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import PoseEstimate
-from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, Positive
 
 __all__ = ["FilterCfg", "RelativeFilter", "RelativeState"]
 
@@ -26,41 +27,35 @@ _NO_RAY = np.zeros(3)
 
 
 @dataclass(frozen=True)
-class FilterCfg:
+class FilterCfg(Checked):
     """Noise levels of the relative filter."""
 
-    position_walk_m_rs: float = 0.03
+    position_walk_m_rs: Positive = 0.03
     """Dead reckoning: standard deviation of position after 1 s, growing with the square root of time."""
-    heading_walk_rad_rs: float = 0.004
+    heading_walk_rad_rs: Positive = 0.004
     """The same for the bearing of the station's axis."""
-    position_floor_m: float = 0.02
+    position_floor_m: Positive = 0.02
     """Added to a measured position's standard deviation."""
-    rotation_floor_rad: float = 0.02
+    rotation_floor_rad: Positive = 0.02
     """Added to a measured rotation's standard deviation: inclinometer, compass and the station's own tilt."""
-    inflation: float = 3.0
+    inflation: Positive = 3.0
     """Factor on a measured covariance: errors of successive frames are alike, which a filter takes for independent."""
-    bearing_floor_rad: float = 0.02
+    bearing_floor_rad: Positive = 0.02
     """Standard deviation of the direction to the entrance lamps."""
-    entrance_spread_m: float = 0.05
+    entrance_spread_m: Positive = 0.05
     """Uncertainty of the entrance lamps' centre, as some of them may be hidden."""
-    min_bearing_range_m: float = 0.6
+    min_bearing_range_m: Positive = 0.6
     """Nearer than this to the entrance lamps, some of them leave the image and their centre misleads."""
-    gate: float = 22.5
+    gate: Positive = 22.5
     """Greatest squared Mahalanobis distance of an accepted pose: 99.9 % of χ² with 6 degrees of freedom."""
-    bearing_gate: float = 13.8
+    bearing_gate: Positive = 13.8
     """The same for a direction: 99.9 % of χ² with 2 degrees of freedom."""
-    max_tilt_mismatch_rad: float = 0.26
+    max_tilt_mismatch_rad: Positive = 0.26
     """A first pose whose roll or pitch disagrees more with the inclinometer is refused."""
-    max_rotation_mismatch_rad: float = 0.6
+    max_rotation_mismatch_rad: Positive = 0.6
     """A pose whose rotation differs more from the expected one is refused outright."""
-    restart_after: int = 10
+    restart_after: Count = 10
     """So many refused poses in a row start the filter anew: the estimate, not the poses, is then wrong."""
-
-    def __post_init__(self) -> None:
-        """All are positive."""
-        for name, value in vars(self).items():
-            if not value > 0:
-                raise ConfigError(name, value, "a value above 0")
 
 
 class RelativeState(NamedTuple):

@@ -12,7 +12,9 @@ from auvdock.controllers.autopilot import AutopilotSetpoint
 from auvdock.controllers.guidance import GuidanceCfg, axis_course, crabbed
 from auvdock.controllers.senses import Senses, Vector
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Positive
 
 __all__ = [
     "Place",
@@ -30,29 +32,25 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class SearchCfg:
+class SearchCfg(Checked):
     """The look around while no light is seen."""
 
-    turn_rate_rad_s: float = 0.3
+    turn_rate_rad_s: Positive = 0.3
     """Rate of the sweep in heading."""
     settle_s: float = 1.5
     """Wait before the first turn."""
-    amplitudes_rad: tuple[float, ...] = (0.7, 1.4)
+    amplitudes_rad: tuple[Positive, ...] = (0.7, 1.4)
     """The sweep widens to these headings on either side."""
     advance_m: float = 5.0
     """Way ahead between two sweeps, if the place before the station is unknown."""
-    advance_speed_m_s: float = 0.5
+    advance_speed_m_s: Positive = 0.5
     """Speed on that way."""
     depth_step_m: float = 1.0
     """Every second sweep runs so much deeper, every fourth so much higher."""
 
     def __post_init__(self) -> None:
-        """Rates and widths are positive."""
-        if not self.turn_rate_rad_s > 0.0:
-            raise ConfigError("turn_rate_rad_s", self.turn_rate_rad_s, "a rate above 0 rad/s")
-        if not self.advance_speed_m_s > 0.0:
-            raise ConfigError("advance_speed_m_s", self.advance_speed_m_s, "a speed above 0 m/s")
-        if not self.amplitudes_rad or min(self.amplitudes_rad) <= 0.0:
+        """Refuse no sweep."""
+        if not self.amplitudes_rad:
             raise ConfigError("amplitudes_rad", self.amplitudes_rad, "one or more angles above 0 rad")
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated, Literal, get_args
 
 from auvdock.core.beacons import BeaconCfg
 from auvdock.core.camera import CameraCfg
-from auvdock.core.checks import check_range
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError, located
+from auvdock.core.limits import NotNegative, Positive, at_least, between
 from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.station import ConicalStationCfg, load_conical_station
 from auvdock.envs.room import hull_room
@@ -17,16 +19,15 @@ from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.water import WaterCfg
 from auvdock.sim.simulator import SimCfg
 
-__all__ = ["FIDELITIES", "HEADINGS", "LimitsCfg", "StartCfg", "WorldCfg", "check_rates", "rotating_world_cfg"]
+__all__ = ["FIDELITIES", "Fidelity", "LimitsCfg", "StartCfg", "WorldCfg", "check_rates", "rotating_world_cfg"]
 
-FIDELITIES = ("pixels", "beacons")
+Fidelity = Literal["pixels", "beacons"]
 """`pixels` renders every frame; `beacons` draws detections from the same radiometry without an image."""
-HEADINGS = ("surveyed", "unknown")
-"""Whether the compass heading of the station's axis is known before the episode."""
+FIDELITIES: tuple[Fidelity, ...] = get_args(Fidelity)
 
 
 @dataclass(frozen=True)
-class StartCfg:
+class StartCfg(Checked):
     """Where an episode starts; each quantity is drawn uniformly.
 
     Either in a box before the mouth, or in a ring about it (`ring`): at a radius of `min_range_m` to `max_range_m`, at
@@ -35,58 +36,46 @@ class StartCfg:
 
     ring: bool = False
     """Start in a ring about the station instead of a box before its mouth."""
-    min_range_m: float = 15.0
+    min_range_m: Annotated[float, at_least(2.0)] = 15.0
     """Least distance in front of the mouth; of a ring its inner radius."""
     max_range_m: float = 30.0
     """Greatest distance in front of the mouth; of a ring its outer radius."""
-    azimuth_deg: float = 180.0
+    azimuth_deg: Annotated[float, between(0.0, 180.0)] = 180.0
     """Of a ring: greatest azimuth to either side of the approach axis; 180 is all around."""
-    lateral_m: float = 3.0
+    lateral_m: NotNegative = 3.0
     """Greatest distance sideways from the approach axis; unused in a ring."""
-    vertical_m: float = 1.5
+    vertical_m: NotNegative = 1.5
     """Greatest depth difference to the mouth's centre."""
-    heading_deg: float = 30.0
+    heading_deg: NotNegative = 30.0
     """Greatest heading difference to the approach axis; in a ring, to the direction of the station."""
     random_current_direction: bool = False
     """Draw the current's direction uniformly instead of taking sim.current.direction_deg."""
 
     def __post_init__(self) -> None:
-        """Refuse impossible starts."""
-        if not 2.0 <= self.min_range_m <= self.max_range_m:
-            raise ConfigError("min_range_m", self.min_range_m, "2 m or more and at most max_range_m")
-        check_range("max_range_m", self.max_range_m, 0.0, math.inf, "a finite distance")
-        if not 0.0 <= self.azimuth_deg <= 180.0:
-            raise ConfigError("azimuth_deg", self.azimuth_deg, "0 to 180 degrees")
-        for name in ("lateral_m", "vertical_m", "heading_deg"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(name, getattr(self, name), "0 or more")
+        """Refuse a ring or box without room."""
+        if self.min_range_m > self.max_range_m:
+            raise ConfigError("min_range_m", self.min_range_m, "at most max_range_m")
 
 
 @dataclass(frozen=True)
-class LimitsCfg:
+class LimitsCfg(Checked):
     """What ends an episode without success."""
 
-    max_time_s: float = 240.0
+    max_time_s: Positive = 240.0
     """Simulated time."""
-    collision_force_n: float = 2000.0
+    collision_force_n: Positive = 2000.0
     """A contact harder than this ends the episode as `collision`."""
-    surfaced_s: float = 5.0
+    surfaced_s: Positive = 5.0
     """Once some of the hull has been out of the water for this long in all, the episode ends as `surfaced`."""
-    carried_off_m: float = 200.0
+    carried_off_m: Positive = 200.0
     """Once the vehicle is this much further from the station than at the start, the episode ends as `carried_off`."""
-
-    def __post_init__(self) -> None:
-        """Refuse limits that end every episode at once."""
-        for name in ("max_time_s", "collision_force_n", "surfaced_s", "carried_off_m"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a number above 0")
 
 
 @dataclass(frozen=True)
-class WorldCfg:
+class WorldCfg(Checked):
     """Everything outside the vehicle's head."""
 
-    fidelity: str = "pixels"
+    fidelity: Fidelity = "pixels"
     """"pixels" or "beacons"."""
     water: str | WaterCfg = "clear"
     """Water preset (Jerlov "I" to "9C", "clear", "pool", "lake"), a TOML file of one's own, or that file's content."""
@@ -103,36 +92,29 @@ class WorldCfg:
     limits: LimitsCfg = LimitsCfg()
     control_hz: float = 30.0
     """Commands a second."""
-    station_heading: str = "surveyed"
+    station_heading: Literal["surveyed", "unknown"] = "surveyed"
     """"surveyed", or "unknown": each episode then draws a datum in ±180° that is added to every compass reading, and
     the station's heading by that compass must be perceived."""
     clock: BeaconClockCfg = BeaconClockCfg()
     """Error of the vehicle's clock against the station's; it matters with a rotating beacon only."""
-    frame_drop_share: float = 0.0
+    frame_drop_share: Annotated[float, between(0.0, 0.95)] = 0.0
     """Share of the camera's frames that are lost at random."""
     extra_lights: tuple[BeaconCfg, ...] = ()
     """Lamps, placed in the station frame, of which the vehicle has not been told."""
 
     def __post_init__(self) -> None:
-        """Check that the rates divide and the names exist."""
-        if self.station_heading not in HEADINGS:
-            raise ConfigError("station_heading", self.station_heading, f"one of {', '.join(HEADINGS)}")
-        if not 0.0 <= self.frame_drop_share <= 0.95:
-            raise ConfigError("frame_drop_share", self.frame_drop_share, "a share of 0 to 0.95")
+        """Refuse rates that do not divide, and lamps and starts that have no place."""
         taken = {light.name for light in self.station.beacons} | {f"B{n}" for n in range(self.station.array_count)}
         for light in self.extra_lights:
             if light.name in taken:
                 raise ConfigError("extra_lights", light.name, "a name that no other light has, the station's included")
             taken.add(light.name)
-        if self.fidelity not in FIDELITIES:
-            raise ConfigError("fidelity", self.fidelity, f"one of {', '.join(FIDELITIES)}")
         check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
         for index, light in enumerate(self.extra_lights):
             low_m, high_m = -self.station.floor_below_m, self.station.depth_m
-            remedy = (
-                f"a height above the mouth's centre between the floor's, {low_m:g} m, and the surface's, {high_m:g} m"
-            )
-            check_range(f"extra_lights[{index}].position_m", light.position_m[2], low_m, high_m, remedy)
+            if not low_m <= light.position_m[2] <= high_m:
+                remedy = f"a height above the mouth's centre of {low_m:g} m, the floor, to {high_m:g} m, the surface"
+                raise ConfigError(f"extra_lights[{index}].position_m", light.position_m[2], remedy)
         self._check_start()
 
     def _check_start(self) -> None:

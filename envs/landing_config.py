@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from auvdock.core.calibrated_camera import CalibratedCameraCfg
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError, located
 from auvdock.core.landing_station import LandingStationCfg, load_landing_station
-from auvdock.envs.config import FIDELITIES, LimitsCfg, check_rates
+from auvdock.core.limits import NotNegative, at_least
+from auvdock.envs.config import Fidelity, LimitsCfg, check_rates
 from auvdock.envs.room import hull_room
 from auvdock.optics.faults import FaultCfg
 from auvdock.optics.lamp import LampCfg
@@ -22,34 +25,31 @@ __all__ = ["LandingStartCfg", "LandingWorldCfg"]
 
 
 @dataclass(frozen=True)
-class LandingStartCfg:
+class LandingStartCfg(Checked):
     """Where a landing starts; each quantity is drawn uniformly."""
 
-    min_height_m: float = 3.0
+    min_height_m: Annotated[float, at_least(0.5)] = 3.0
     """Least height of the seat above its place in the guides."""
     max_height_m: float = 6.0
     """Greatest such height."""
-    lateral_m: float = 1.5
+    lateral_m: NotNegative = 1.5
     """Greatest distance from the station's vertical, along and across the centre line each."""
-    heading_deg: float = 45.0
+    heading_deg: NotNegative = 45.0
     """Greatest heading difference to the centre line."""
     random_current_direction: bool = True
     """Draw the current's direction uniformly instead of taking sim.current.direction_deg."""
 
     def __post_init__(self) -> None:
-        """Refuse impossible starts."""
-        if not 0.5 <= self.min_height_m <= self.max_height_m:
-            raise ConfigError("min_height_m", self.min_height_m, "0.5 m or more and at most max_height_m")
-        for name in ("max_height_m", "lateral_m", "heading_deg"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(name, getattr(self, name), "0 or more")
+        """Refuse heights out of order."""
+        if self.min_height_m > self.max_height_m:
+            raise ConfigError("min_height_m", self.min_height_m, "at most max_height_m")
 
 
 @dataclass(frozen=True)
-class LandingWorldCfg:
+class LandingWorldCfg(Checked):
     """Everything outside the head of a vehicle that lands."""
 
-    fidelity: str = "pixels"
+    fidelity: Fidelity = "pixels"
     """"pixels" or "beacons"."""
     water: str | WaterCfg = "clear"
     """Water preset (Jerlov "I" to "9C", "clear", "pool", "lake"), a TOML file of one's own, or that file's content."""
@@ -72,9 +72,7 @@ class LandingWorldCfg:
     """Commands a second; the paper's loop runs at 20 Hz, as its camera does. A multiple of the camera's rate."""
 
     def __post_init__(self) -> None:
-        """Check that the rates divide and the names exist."""
-        if self.fidelity not in FIDELITIES:
-            raise ConfigError("fidelity", self.fidelity, f"one of {', '.join(FIDELITIES)}")
+        """Refuse rates that do not divide, and starts that have no place."""
         check_rates(self.sim.physics_hz, self.control_hz, self.camera.rate_hz)
         periods = self.control_hz / self.camera.rate_hz
         if abs(periods - round(periods)) > 1e-9:

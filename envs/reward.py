@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import NotNegative
 
 __all__ = ["RewardCfg"]
 
@@ -14,29 +14,23 @@ _FREE_OF_CHARGE = ("timeout", "terminal")
 
 
 @dataclass(frozen=True)
-class RewardCfg:
+class RewardCfg(Checked):
     """r = progress_per_m Δd − energy_per_j ΔW − time_per_s Δt, plus or less what the end of the episode is worth.
 
     Δd is the way made towards where the latch closes in m, ΔW the thrusters' hydraulic work in J, Δt the control period
     in s. The end is paid in the episode's last step, and there is no step after it.
     """
 
-    progress_per_m: float = 1.0
+    progress_per_m: NotNegative = 1.0
     """For each metre nearer to where the latch closes."""
-    energy_per_j: float = 0.001
+    energy_per_j: NotNegative = 0.001
     """Taken off for each joule of thruster work."""
-    time_per_s: float = 0.0
+    time_per_s: NotNegative = 0.0
     """Taken off for each second."""
-    success: float = 100.0
+    success: NotNegative = 100.0
     """For docking."""
-    failure: float = 50.0
+    failure: NotNegative = 50.0
     """Taken off where an episode ends early without success, a latch that closed on a bad entry apart."""
-
-    def __post_init__(self) -> None:
-        """All are finite; a cost below 0 would be a prize."""
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ConfigError(name, value, "0 or more")
 
     def of(self, progress_m: float, work_j: float, period_s: float, *, success: bool, end: str | None) -> float:
         """Reward of one control period.

@@ -7,21 +7,23 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from scipy.special import ndtri
 
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
-from auvdock.core.strict import setting_type
+from auvdock.core.limits import between
+from auvdock.core.strict import bare_type, setting_type
 from auvdock.episode.config import AnyEpisodeCfg
 
 __all__ = [
     "ALIASES",
-    "DISTRIBUTIONS",
     "KIND_WORDS",
     "WATER_AXES",
     "AxisCfg",
     "AxisValue",
+    "Distribution",
     "axis_kind",
     "joined",
     "nested",
@@ -57,7 +59,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
 WATER_AXES = ("water", "world.water")
 """Names of the axis that varies the water, whose values may be files."""
 
-DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
+Distribution = Literal["uniform", "log_uniform", "normal"]
 """`normal` has 95 % of its mass between low and high and is cut off there."""
 
 KIND_WORDS: Mapping[type[AxisValue], str] = {
@@ -72,7 +74,7 @@ _MOST_VALUES = 1000
 
 
 @dataclass(frozen=True)
-class AxisCfg:
+class AxisCfg(Checked):
     """One varied quantity.
 
     With `values`, or with `low`, `high` and `count`, it is a grid axis; with `low` and `high` alone each episode draws
@@ -87,9 +89,9 @@ class AxisCfg:
     """Least value."""
     high: float | None = None
     """Greatest value."""
-    count: int = 0
+    count: Annotated[int, between(0, _MOST_VALUES)] = 0
     """Grid values between low and high, both included; 0 draws from the distribution."""
-    distribution: str = "uniform"
+    distribution: Distribution = "uniform"
     """"uniform", "log_uniform" or "normal"."""
 
     def __post_init__(self) -> None:
@@ -103,13 +105,10 @@ class AxisCfg:
             return
         if self.low is None or self.high is None:
             raise ConfigError("values", (), f"values for the axis {self.name!r}, or low and high in their place")
-        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+        if not self.low < self.high:
             raise ConfigError("low", self.low, f"finite numbers with low below high, which is {self.high}")
-        if self.count < 0 or self.count == 1 or self.count > _MOST_VALUES:
-            remedy = f"2 or more grid values, up to {_MOST_VALUES}, or 0 to draw from a distribution"
-            raise ConfigError("count", self.count, remedy)
-        if self.distribution not in DISTRIBUTIONS:
-            raise ConfigError("distribution", self.distribution, f"one of {', '.join(DISTRIBUTIONS)}")
+        if self.count == 1:
+            raise ConfigError("count", self.count, "2 or more grid values, or 0 to draw from a distribution")
         if self.distribution == "log_uniform" and self.low <= 0.0:
             raise ConfigError("low", self.low, "a number above 0 for log_uniform")
 
@@ -213,7 +212,7 @@ def axis_kind(episode: type[AnyEpisodeCfg], name: str) -> type[AxisValue]:
         known = f"the axis {near[0]!r}" if near else f"one of {', '.join(ALIASES)}"
         raise ConfigError(name, name, f"{known}, or a dotted setting such as world.start.heading_deg")
     hint = setting_type(episode, ALIASES.get(name, (name,))[0])
-    options = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    options = [bare_type(option) for option in get_args(hint)] if get_origin(hint) in (Union, UnionType) else [hint]
     for kind in KIND_WORDS:
         if kind in options:
             return kind

@@ -6,17 +6,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from auvdock.campaign.axes import WATER_AXES, AxisCfg, AxisValue, axis_kind, joined
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError, located
+from auvdock.core.limits import Positive, at_least, below, between
 from auvdock.core.strict import from_mapping
 from auvdock.episode.config import LEVELS, AnyEpisodeCfg, landing_level_cfg, level_cfg
 
-__all__ = ["SAMPLINGS", "STATIONS", "CampaignCfg", "campaign_from_plain"]
+__all__ = ["STATIONS", "CampaignCfg", "campaign_from_plain"]
 
-SAMPLINGS = ("random", "latin_hypercube", "sobol")
-"""How axes that are distributions are drawn."""
 STATIONS: Mapping[str, Callable[[int], AnyEpisodeCfg]] = {
     "conical": level_cfg,
     "rotating": partial(level_cfg, station="rotating"),
@@ -30,7 +30,7 @@ _LEAST_LIMIT_S, _TIMES_SIMULATED = 600.0, 5.0
 
 
 @dataclass(frozen=True)
-class CampaignCfg:
+class CampaignCfg(Checked):
     """Many episodes of one task: what stays, what varies, how many, and from which seed."""
 
     name: str = "campaign"
@@ -39,17 +39,17 @@ class CampaignCfg:
     """Docking station."""
     level: int = 1
     """Difficulty level that all episodes start from, unless an axis named "level" varies it."""
-    episodes: int = 100
+    episodes: Annotated[int, between(1, _MOST_EPISODES)] = 100
     """Episodes; with `until_ci` the most that are run."""
-    seed: int = 0
+    seed: Annotated[int, at_least(0)] = 0
     """Decides every episode's seed and every draw."""
-    sampling: str = "random"
+    sampling: Literal["random", "latin_hypercube", "sobol"] = "random"
     """How drawn axes are sampled: "random", "latin_hypercube" or "sobol"."""
-    until_ci: float = 0.0
+    until_ci: Annotated[float, at_least(0.0), below(0.5)] = 0.0
     """Stop once the success rate's 95 % interval is no wider than plus or minus this; 0 runs all episodes."""
     until_ci_per_cell: bool = False
     """With `until_ci`: every cell of the grid goes on until its own interval is narrow enough."""
-    episode_limit_s: float | None = None
+    episode_limit_s: Positive | None = None
     """Wall-clock limit of one episode; past it the episode counts as `hung`. None: see `wall_limit_s`."""
     axes: tuple[AxisCfg, ...] = ()
     """What varies. Grid axes are crossed with each other; drawn axes are drawn anew for each episode."""
@@ -62,18 +62,8 @@ class CampaignCfg:
         """Refuse what cannot be run, before anything is run."""
         if self.station not in STATIONS:
             raise ConfigError("station", self.station, f"one of {', '.join(STATIONS)}")
-        if self.sampling not in SAMPLINGS:
-            raise ConfigError("sampling", self.sampling, f"one of {', '.join(SAMPLINGS)}")
-        if not 1 <= self.episodes <= _MOST_EPISODES:
-            raise ConfigError("episodes", self.episodes, f"a whole number of 1 or more, up to {_MOST_EPISODES}")
-        if self.seed < 0:
-            raise ConfigError("seed", self.seed, "a whole number of 0 or more")
-        if not 0.0 <= self.until_ci < 0.5:
-            raise ConfigError("until_ci", self.until_ci, "half an interval's width, above 0 and below 0.5, or 0")
         if self.until_ci_per_cell and not self.until_ci:
             raise ConfigError("until_ci_per_cell", True, "until_ci beside it, the width that each cell is to reach")
-        if self.episode_limit_s is not None and not self.episode_limit_s > 0.0:
-            raise ConfigError("episode_limit_s", self.episode_limit_s, "a time above 0 s")
         names = [axis.name for axis in self.axes]
         if len(set(names)) != len(names):
             raise ConfigError("axes", names, "each axis once")

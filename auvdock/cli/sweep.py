@@ -31,7 +31,7 @@ from auvdock.cli.early_flags import find_flags
 from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, named_by_flag, parse, station_file, with_station
 from auvdock.cli.sweep_progress import SweepProgress
 from auvdock.core.errors import ConfigError
-from auvdock.core.strict import names_file, read_toml, recheck, to_plain
+from auvdock.core.strict import names_file, read_toml, to_plain
 from auvdock.episode.config import AnyEpisodeCfg, EpisodeCfg, LandingEpisodeCfg
 
 __all__ = ["Sweep", "plain_summary", "print_summary", "run"]
@@ -253,7 +253,7 @@ def _resolve(args: SweepFlags, episode: AnyEpisodeCfg, station: str) -> Campaign
     with named_by_flag(until_ci="until-ci", until_ci_per_cell="until-ci-per-cell", episode_limit_s="episode-limit"):
         changed = joined((there.episode, changes))
         wanted = dataclasses.replace(there, **plain, axes=(*kept, *axes), episode=changed)
-        return keep_files(recheck(wanted))
+        return keep_files(wanted)
 
 
 def _start(args: SweepFlags, station: str) -> AnyEpisodeCfg:

@@ -5,21 +5,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated, Literal
 
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.checks import check_above, check_finite
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Positive, PositiveShare, between
 
-__all__ = ["ROLES", "BeaconCfg", "BeaconLayout", "ring_layout"]
+__all__ = ["BeaconCfg", "BeaconLayout", "BeamAngle", "WavelengthNm", "ring_layout"]
 
-ROLES = ("array", "long_range", "entrance")
-"""What a beacon is for: pose by PnP, far line of sight, near line of sight (paper A, section 3.1)."""
+BeamAngle = Annotated[float, between(0.5, 360.0)]
+"""Full angle of a beam, degrees."""
+WavelengthNm = Annotated[float, between(380.0, 720.0, "which is visible")]
+"""Dominant wavelength of a lamp."""
 
 
 @dataclass(frozen=True)
-class BeaconCfg:
+class BeaconCfg(Checked):
     """One light, in the station frame.
 
     The station frame has its origin in the centre of the mouth, x along the approach axis out towards the vehicle,
@@ -28,34 +32,23 @@ class BeaconCfg:
 
     name: str
     """Unique name; the array's are B0, B1, ... in the order of paper A's layout."""
-    role: str
-    """One of "array", "long_range", "entrance"."""
+    role: Literal["array", "long_range", "entrance"]
+    """What it is for: pose by PnP, far line of sight, near line of sight (paper A, section 3.1)."""
     position_m: tuple[float, float, float]
     """Position in the station frame."""
     axis: tuple[float, float, float]
     """Direction of the beam's axis in the station frame; any length."""
-    wavelength_nm: float
+    wavelength_nm: WavelengthNm
     """Dominant wavelength: 450 is blue, 620 red."""
-    power_w: float
+    power_w: Positive
     """Electrical power."""
-    efficiency: float
+    efficiency: PositiveShare
     """Radiant flux over electrical power."""
-    beam_angle_deg: float
+    beam_angle_deg: BeamAngle
     """Full beam angle at half of the peak intensity."""
 
     def __post_init__(self) -> None:
-        """Refuse what no lamp can be."""
-        if self.role not in ROLES:
-            raise ConfigError("role", self.role, f"one of {', '.join(ROLES)}")
-        if not 380.0 <= self.wavelength_nm <= 720.0:
-            raise ConfigError("wavelength_nm", self.wavelength_nm, "a visible wavelength of 380 to 720 nm")
-        check_finite("position_m", self.position_m, "three finite coordinates")
-        check_finite("axis", self.axis, "three finite components")
-        check_above("power_w", self.power_w, 0.0, "a power above 0 W")
-        if not 0.0 < self.efficiency <= 1.0:
-            raise ConfigError("efficiency", self.efficiency, "a fraction above 0 and up to 1")
-        if not 0.5 <= self.beam_angle_deg <= 360.0:
-            raise ConfigError("beam_angle_deg", self.beam_angle_deg, "a full angle of 0.5 to 360 degrees")
+        """Refuse a beam without direction."""
         if not sum(part * part for part in self.axis) > 0.0:
             raise ConfigError("axis", self.axis, "a direction of non-zero length")
 

@@ -19,15 +19,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.camera import Camera, check_size
+from auvdock.core.camera import Camera, FrameRate, SidePx
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Positive
 from auvdock.core.transforms import make_transform, rotation_looking_along
 
 __all__ = ["CalibratedCameraCfg", "fit_opencv_distortion", "ideal_coordinates", "make_calibrated_camera"]
 
 
 @dataclass(frozen=True)
-class CalibratedCameraCfg:
+class CalibratedCameraCfg(Checked):
     """A camera as its calibration gives it; the defaults are the downward camera of paper C (tables 3, section 4.1.2).
 
     The published text has lost its minus signs. Those of k1, k2, k3 are ours, by reasoning: a flat port makes a ray
@@ -38,17 +40,17 @@ class CalibratedCameraCfg:
     decides nothing. Nothing decides the signs of p1 and p2: they stand as printed and move a corner by less than 3 px.
     """
 
-    width_px: int = 800
+    width_px: SidePx = 800
     """Image width in pixels."""
-    height_px: int = 600
+    height_px: SidePx = 600
     """Image height in pixels."""
-    rate_hz: float = 20.0
+    rate_hz: FrameRate = 20.0
     """Frames a second; must divide the physics rate."""
-    focal_length_m: float = 7.109e-3
+    focal_length_m: Positive = 7.109e-3
     """Focal length in water (paper C: 7.109 mm)."""
-    pixel_width_m: float = 8.29e-6
+    pixel_width_m: Positive = 8.29e-6
     """Pitch of the pixels along a row (paper C, table 3)."""
-    pixel_height_m: float = 8.30e-6
+    pixel_height_m: Positive = 8.30e-6
     """Pitch of the pixels along a column (paper C, table 3)."""
     principal_point_px: tuple[float, float] = (417.582, 285.199)
     """Column and row of the principal point; pixel centres have integer coordinates."""
@@ -59,12 +61,6 @@ class CalibratedCameraCfg:
 
     def __post_init__(self) -> None:
         """Refuse what no camera can be."""
-        check_size(self.width_px, self.height_px)
-        if not 0.0 < self.rate_hz <= 1000.0:
-            raise ConfigError("rate_hz", self.rate_hz, "a frame rate above 0 Hz and up to 1000 Hz")
-        for name in ("focal_length_m", "pixel_width_m", "pixel_height_m"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(name, getattr(self, name), "a length above 0 m")
         for side_px, pitch_m in ((self.width_px, self.pixel_width_m), (self.height_px, self.pixel_height_m)):
             seen_deg = math.degrees(2.0 * math.atan2(0.5 * side_px * pitch_m, self.focal_length_m))
             if not 1.0 <= seen_deg <= 150.0:

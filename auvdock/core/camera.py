@@ -5,54 +5,45 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import cv2
 import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray, check_shape
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import above, at_most, between
 from auvdock.core.transforms import make_transform, rotation_looking_along
 
-__all__ = ["Camera", "CameraCfg", "check_size", "make_camera"]
+__all__ = ["Camera", "CameraCfg", "FieldOfView", "FrameRate", "SidePx", "make_camera"]
 
 _MOST_PX = 8192
 """Along one side: a frame of as many either way takes 0.8 GB while it is rendered."""
 
 
-def check_size(width_px: int, height_px: int) -> None:
-    """Refuse an image that is too small to show anything, or too large to render.
-
-    Raises:
-        ConfigError: such an image; its field is `width_px` or `height_px`.
-    """
-    for name, side in (("width_px", width_px), ("height_px", height_px)):
-        if not 16 <= side <= _MOST_PX:
-            raise ConfigError(name, side, f"at least 16 pixels and at most {_MOST_PX}")
+SidePx = Annotated[int, between(16, _MOST_PX)]
+"""Pixels along one side of an image: enough to show anything, not too many to render."""
+FrameRate = Annotated[float, above(0.0), at_most(1000.0)]
+"""Frames a second."""
+FieldOfView = Annotated[float, between(1.0, 150.0)]
+"""Full angle that a camera sees, degrees."""
 
 
 @dataclass(frozen=True)
-class CameraCfg:
+class CameraCfg(Checked):
     """A camera as its data sheet gives it."""
 
-    width_px: int = 640
+    width_px: SidePx = 640
     """Image width in pixels."""
-    height_px: int = 360
+    height_px: SidePx = 360
     """Image height in pixels."""
-    rate_hz: float = 30.0
+    rate_hz: FrameRate = 30.0
     """Frames a second; must divide the physics rate."""
-    horizontal_fov_deg: float = 85.0
+    horizontal_fov_deg: FieldOfView = 85.0
     """Full horizontal field of view in water (paper B: 85)."""
-    vertical_fov_deg: float = 50.0
+    vertical_fov_deg: FieldOfView = 50.0
     """Full vertical field of view in water (paper B: 50)."""
-
-    def __post_init__(self) -> None:
-        """Refuse what no camera can be."""
-        check_size(self.width_px, self.height_px)
-        if not 0.0 < self.rate_hz <= 1000.0:
-            raise ConfigError("rate_hz", self.rate_hz, "a frame rate above 0 Hz and up to 1000 Hz")
-        for name in ("horizontal_fov_deg", "vertical_fov_deg"):
-            if not 1.0 <= getattr(self, name) <= 150.0:
-                raise ConfigError(name, getattr(self, name), "a full angle of 1 to 150 degrees")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,8 @@
 """Plain data into frozen dataclasses: each value is of its field's type, or refused under its full path.
 
-Configuration consists of nested dataclasses, floats, whole numbers, text, truth values, tuples of these, a choice of
-them (`float | None`), and tables whose content somebody else checks (`Mapping[str, Any]`).
+Configuration consists of nested dataclasses, floats, whole numbers, text, names (`Literal`), truth values, tuples of
+these, a choice of them (`float | None`), and tables whose content somebody else checks (`Mapping[str, Any]`). A number
+may be annotated with limits (`core.limits`); they and the magnitudes of `core.magnitudes` are checked here alone.
 """
 
 from __future__ import annotations
@@ -13,12 +14,15 @@ import types
 import typing
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+import numpy as np
 
 from auvdock.core.errors import ConfigError, located
-from auvdock.core.magnitudes import FINITE, WHOLE, check_magnitude
+from auvdock.core.limits import Limit
+from auvdock.core.magnitudes import FINITE, WHOLE, check_magnitude, unit_of
 
-__all__ = ["from_mapping", "hints_of", "known_table", "read_value"]
+__all__ = ["bare_type", "from_mapping", "hints_of", "known_table", "read_value"]
 
 T = TypeVar("T")
 
@@ -30,11 +34,23 @@ _WANTED: Mapping[Any, str] = {
     types.NoneType: "nothing",
 }
 _LARGEST_FLOAT = int(float.fromhex("0x1.fffffffffffffp+1023"))
-"""As a whole number, with which any whole number and any float compare; NaN is not at most anything."""
+"""As a whole number: greater ones become no float."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
-hints_of = cache(get_type_hints)
-"""Types of a dataclass' fields, by name; remembered, since annotations are text that takes long to read."""
+
+@cache
+def hints_of(cls: Any) -> Mapping[str, Any]:  # noqa: ANN401 - a dataclass of any kind
+    """Annotations of a dataclass' fields, by name; remembered, since they are text that takes long to read."""
+    hints = get_type_hints(cls, include_extras=True)
+    return {field.name: hints[field.name] for field in dataclasses.fields(cls) if field.init}
+
+
+def bare_type(hint: Any) -> Any:  # noqa: ANN401
+    """The type that an annotation limits: float of `Annotated[float, above(0.0)]`, str of `Literal["a", "b"]`."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return arguments[0]
+    return type(arguments[0]) if origin is Literal else hint
 
 
 def from_mapping(cls: type[T], data: Mapping[str, Any], prefix: str = "") -> T:
@@ -72,6 +88,10 @@ def read_value(hint: Any, value: Any, path: str) -> Any:  # noqa: ANN401
             return value
         return from_mapping(typing.cast(type, hint), _table(value, path), f"{path}.")
     origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _within(arguments[1:], read_value(arguments[0], value, path), path)
+    if origin is Literal:
+        return _read_name(arguments, value, path)
     if origin in (typing.Union, types.UnionType):
         return _read_choice(arguments, value, path)
     if origin is tuple:
@@ -79,6 +99,20 @@ def read_value(hint: Any, value: Any, path: str) -> Any:  # noqa: ANN401
     if origin is Mapping:
         return dict(_table(value, path))
     return _read_scalar(hint, value, path)
+
+
+def _within(limits: tuple[Limit, ...], value: Any, path: str) -> Any:  # noqa: ANN401
+    if all(limit.admits(value) for limit in limits):
+        return value
+    unit = unit_of(path, value)
+    words = " and ".join(limit.words.format(unit=f" {unit}" if unit else "") for limit in limits)
+    raise ConfigError(path, value, ", ".join([words, *(limit.why for limit in limits if limit.why)]))
+
+
+def _read_name(names: tuple[Any, ...], value: Any, path: str) -> Any:  # noqa: ANN401
+    if isinstance(value, str) and value in names:
+        return value
+    raise ConfigError(path, value, f"one of {', '.join(names)}")
 
 
 def _read_choice(options: tuple[Any, ...], value: Any, path: str) -> Any:  # noqa: ANN401
@@ -113,13 +147,13 @@ def _read_tuple(wanted: tuple[Any, ...], value: Any, path: str) -> tuple[Any, ..
 def _read_scalar(hint: Any, value: Any, path: str) -> Any:  # noqa: ANN401
     if hint not in _WANTED:
         raise TypeError(f"{path}: settings of type {hint} cannot be read")
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)  # Python counts True as 1
-    if hint is float and is_number and abs(value) <= _LARGEST_FLOAT:
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)  # Python counts True as 1
+    if hint is float and (isinstance(value, float | np.floating) or (is_whole and abs(int(value)) <= _LARGEST_FLOAT)):
         check_magnitude(path, float(value))
         return float(value)
-    if hint is int and is_number and isinstance(value, int):
-        check_magnitude(path, value)
-        return value
+    if hint is int and is_whole:
+        check_magnitude(path, int(value))
+        return int(value)
     if hint in (str, bool, types.NoneType) and isinstance(value, hint):
         return value
     raise ConfigError(path, value, _WANTED[hint])
@@ -138,7 +172,7 @@ def known_table(cls: Any, data: Any, prefix: str) -> Mapping[str, Any]:  # noqa:
         ConfigError: it is none, or has an unknown key; the message names the nearest known one.
     """
     table = _table(data, prefix.rstrip(".") or cls.__name__)
-    known = [field.name for field in dataclasses.fields(cls) if field.init]
+    known = list(hints_of(cls))
     for key in table:
         if key not in known:
             name = str(key) if _BARE_KEY.fullmatch(str(key)) else repr(key)

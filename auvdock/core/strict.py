@@ -12,9 +12,10 @@ from typing import Any, TypeVar, get_args
 
 from auvdock.core.errors import ConfigError, located
 from auvdock.core.magnitudes import check_magnitude
-from auvdock.core.reader import from_mapping, hints_of, known_table, read_value
+from auvdock.core.reader import bare_type, from_mapping, hints_of, known_table, read_value
 
 __all__ = [
+    "bare_type",
     "from_mapping",
     "load_toml",
     "merge",
@@ -83,21 +84,20 @@ def recheck(value: T, prefix: str = "") -> T:
     """
     if not dataclasses.is_dataclass(value) or isinstance(value, type):
         raise TypeError("recheck needs a dataclass instance")
-    fields = [field.name for field in dataclasses.fields(value) if field.init]
-    values = {name: _rechecked(getattr(value, name), f"{prefix}{name}") for name in fields}
+    values = {name: _rechecked(getattr(value, name), f"{prefix}{name}") for name in hints_of(type(value))}
     with located(prefix):
         return type(value)(**values)
 
 
 def setting_type(cls: type, path: str, prefix: str = "") -> Any:  # noqa: ANN401 - a type as annotations write it
-    """The type of a dotted setting of the dataclass `cls`.
+    """The type of a dotted setting of the dataclass `cls`, without its limits.
 
     Raises:
         ConfigError: no such setting.
     """
     name, _, rest = path.partition(".")
     known_table(cls, {name: None}, prefix)
-    hint = hints_of(cls)[name]
+    hint = bare_type(hints_of(cls)[name])
     if not rest:
         return hint
     for option in get_args(hint) or (hint,):

@@ -11,12 +11,15 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from auvdock.assets import asset
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Positive
 from auvdock.core.marine import flip_matrix, flip_twist, flip_vector
 from auvdock.core.strict import load_toml
 
@@ -28,7 +31,7 @@ _NAME = re.compile(r"^([XYZKMN])_(u)?([uvwpqr])(dot)?$|^([XYZKMN])_([uvwpqr])\6$
 
 
 @dataclass(frozen=True)
-class Coefficient:
+class Coefficient(Checked):
     """One hydrodynamic derivative with its unit and where it was published."""
 
     name: str
@@ -42,7 +45,7 @@ class Coefficient:
 
 
 @dataclass(frozen=True)
-class ActuatorCfg:
+class ActuatorCfg(Checked):
     """A thruster or a fin.
 
     A thruster gives force = max_force_n × command along `direction` at `position_m`. A fin gives the wrench
@@ -51,7 +54,7 @@ class ActuatorCfg:
 
     name: str
     """Unique name."""
-    kind: str
+    kind: Literal["thruster", "fin"]
     """"thruster" or "fin"."""
     source: str
     """Where its figures come from."""
@@ -63,7 +66,7 @@ class ActuatorCfg:
     """Thrust at command 1."""
     disc_diameter_m: float = 0.1
     """Propeller diameter, for the power that the thrust costs."""
-    time_constant_s: float = 0.1
+    time_constant_s: Positive = 0.1
     """First-order lag."""
     dead_band: float = 0.0
     """Commands below this magnitude give nothing."""
@@ -72,16 +75,9 @@ class ActuatorCfg:
     fin_wrench: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     """Marine wrench for u |u| × angle = 1 (N s²/m² and N s²/m per rad)."""
 
-    def __post_init__(self) -> None:
-        """Check the kind."""
-        if self.kind not in ("thruster", "fin"):
-            raise ConfigError("kind", self.kind, "'thruster' or 'fin'")
-        if not self.time_constant_s > 0.0:
-            raise ConfigError("time_constant_s", self.time_constant_s, "a time above 0 s")
-
 
 @dataclass(frozen=True)
-class MountCfg:
+class MountCfg(Checked):
     """Where a camera sits; marine axes."""
 
     position_m: tuple[float, float, float]
@@ -90,26 +86,22 @@ class MountCfg:
 
 
 @dataclass(frozen=True)
-class HullPartCfg:
+class HullPartCfg(Checked):
     """A solid part of the vehicle: what touches a station and what is drawn; marine axes."""
 
     name: str
     """Unique name."""
-    shape: str
+    shape: Literal["box", "capsule", "cylinder"]
     """"box", or "capsule" or "cylinder" lying along x."""
     position_m: tuple[float, float, float]
     """Centre from the origin."""
-    size_m: tuple[float, float, float]
+    size_m: tuple[Positive, Positive, Positive]
     """Full extent along x, y and z; round parts have their diameter twice."""
     displaces: bool = True
     """Whether the vehicle's buoyancy is spread over its volume; an open cage of rods displaces next to nothing."""
 
     def __post_init__(self) -> None:
-        """Check shape and size."""
-        if self.shape not in ("box", "capsule", "cylinder"):
-            raise ConfigError("shape", self.shape, "'box', 'capsule' or 'cylinder'")
-        if not all(size > 0.0 for size in self.size_m):
-            raise ConfigError("size_m", self.size_m, "three lengths above 0 m")
+        """Refuse round parts that are not round, and capsules without a straight part."""
         if self.shape != "box" and self.size_m[1] != self.size_m[2]:
             raise ConfigError("size_m", self.size_m, "the same diameter along y and z")
         if self.shape == "capsule" and self.size_m[0] <= self.size_m[1]:
@@ -117,7 +109,7 @@ class HullPartCfg:
 
 
 @dataclass(frozen=True)
-class VehicleCfg:
+class VehicleCfg(Checked):
     """Everything that is published of a vehicle and that its pilot may know."""
 
     name: str

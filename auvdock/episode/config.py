@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 from auvdock.assets import asset
 from auvdock.controllers.landing.config import LandingControlCfg
 from auvdock.controllers.pilot import ControlCfg
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import merge, read_toml
 from auvdock.envs.config import WorldCfg, rotating_world_cfg
@@ -34,7 +35,7 @@ LEVEL_STATIONS = ("conical", "rotating")
 
 
 @dataclass(frozen=True)
-class EpisodeCfg:
+class EpisodeCfg(Checked):
     """One docking episode."""
 
     world: WorldCfg = WorldCfg()
@@ -53,7 +54,7 @@ class EpisodeCfg:
 
 
 @dataclass(frozen=True)
-class LandingEpisodeCfg:
+class LandingEpisodeCfg(Checked):
     """One landing episode."""
 
     world: LandingWorldCfg = LandingWorldCfg()

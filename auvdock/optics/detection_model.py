@@ -5,7 +5,6 @@ The parameters are fitted on rendered frames (`optics.detection_fit`), one file 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -14,8 +13,9 @@ import numpy as np
 
 from auvdock.assets import asset
 from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections
-from auvdock.core.errors import ConfigError
+from auvdock.core.limits import NotNegative, Positive, Share
 from auvdock.core.strict import load_toml
 from auvdock.optics.detection_loop import drawn, merge, with_ghosts
 from auvdock.optics.light_loop import close, crowded, veiled
@@ -38,7 +38,7 @@ _GHOST_FLUX = 0.3
 
 
 @dataclass(frozen=True)
-class FlashModelCfg:
+class FlashModelCfg(Checked):
     """Behaviour of a detector towards a rotating beacon: a light whose halo and beam decide about size and shape.
 
     Found with probability 1 / (1 + (C_50 / C)^slope), C the code of its peak above the code at `background_px`. The
@@ -46,39 +46,30 @@ class FlashModelCfg:
     "mild" daylight, 6 to 50 m, the beam up to 45° off.
     """
 
-    contrast_50_dn: float = 8.6
+    contrast_50_dn: Positive = 8.6
     """Contrast at which half of the flashes are found."""
-    slope: float = 13.0
+    slope: Positive = 13.0
     """Steepness in ln C."""
-    background_px: float = 25.0
+    background_px: Positive = 25.0
     """What is broader than this the detector takes for background."""
-    floor_dn: float = 8.0
+    floor_dn: Positive = 8.0
     """Contrast above which it sees light at all: the box is about what is brighter than half-way from there to the
     peak."""
-    box_scale: float = 1.0
+    box_scale: Positive = 1.0
     """Size of the box over the size of the part that is brighter than half of the peak."""
-    centre_shift: float = 0.65
+    centre_shift: NotNegative = 0.65
     """Shift of the centre along the beam over the shift of the box's middle."""
-    centre_spread: float = 0.06
+    centre_spread: NotNegative = 0.06
     """Standard deviation of the centre per axis over the box's mean half side, at a contrast of ten times the noise."""
-    flux_spread: float = 0.015
+    flux_spread: NotNegative = 0.015
     """Standard deviation of ln(flux), beyond shot noise."""
-
-    def __post_init__(self) -> None:
-        """Refuse what is no width."""
-        for name in ("contrast_50_dn", "slope", "background_px", "floor_dn", "box_scale"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(name, getattr(self, name), "a number above 0")
-        for name in ("centre_shift", "centre_spread", "flux_spread"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 _FLASH = FlashModelCfg()
 
 
 @dataclass(frozen=True)
-class DetectionModelCfg:
+class DetectionModelCfg(Checked):
     """Behaviour of one detector.
 
     A light is found with probability ceiling / (1 + (C_50 / C)^slope), C its contrast in codes above its surroundings,
@@ -89,29 +80,29 @@ class DetectionModelCfg:
     """The detector."""
     source: str
     """What it was fitted on."""
-    contrast_50_dn: float
+    contrast_50_dn: Positive
     """Contrast at which half of the lights are found in dark surroundings."""
-    surround_factor: float
+    surround_factor: NotNegative
     """Rise of that contrast per code of the surroundings."""
-    slope: float
+    slope: Positive
     """Steepness in ln C."""
-    ceiling: float
+    ceiling: Share
     """Probability of finding a light of any contrast."""
-    merge_px: float
+    merge_px: NotNegative
     """Two point-like lights closer than this are one."""
-    merge_radii: float
+    merge_radii: NotNegative
     """In addition this many times the sum of the radii of their saturated discs."""
-    centre_floor_px: float
+    centre_floor_px: NotNegative
     """Standard deviation of a bright light's centre, per axis."""
-    centre_at_100: float
+    centre_at_100: NotNegative
     """In addition this many widths of the spot at a contrast of 100; falls with the square of contrast, for a dim light
     has noise as well as the slope of its neighbours' halos against it."""
-    score_gain: float
+    score_gain: Positive
     """Score = s / (s + 10) with s this times contrast over noise."""
-    false_alarms: float
+    false_alarms: NotNegative
     """Mean number of detections per frame that belong to no light when all lights are veiled: haze that breaks into
     spots. It falls with the share of lights that are; see `veiled_share`."""
-    wrong_colour: float
+    wrong_colour: Share
     """Share of detections of the wrong class."""
     flash: FlashModelCfg | None = None
     """Towards a rotating beacon; None: the defaults of `FlashModelCfg`."""
@@ -124,18 +115,6 @@ class DetectionModelCfg:
         measured = self.centre_at_100, self.centre_floor_px, self.score_gain, self.wrong_colour
         merged = self.merge_px, self.merge_radii
         return np.array([*found, *measured, ways.contrast_50_dn, ways.slope, *merged])
-
-    def __post_init__(self) -> None:
-        """Refuse what is no probability or no width."""
-        for name in ("contrast_50_dn", "slope", "score_gain"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(name, getattr(self, name), "a number above 0")
-        for name in ("surround_factor", "merge_px", "merge_radii", "centre_floor_px", "centre_at_100", "false_alarms"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(name, getattr(self, name), "0 or more")
-        for name in ("ceiling", "wrong_colour"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ConfigError(name, getattr(self, name), "a probability of 0 to 1")
 
 
 class Flash(NamedTuple):

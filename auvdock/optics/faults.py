@@ -8,32 +8,25 @@ import numpy as np
 
 from auvdock.core.arrays import IntArray
 from auvdock.core.beacons import BeaconLayout
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import NotNegative
 
 __all__ = ["FaultCfg", "TagCover", "dead_indices"]
 
 
 @dataclass(frozen=True)
-class FaultCfg:
+class FaultCfg(Checked):
     """What is broken; nothing by default."""
 
-    tag_hidden_from_s: float | None = None
+    tag_hidden_from_s: NotNegative | None = None
     """Time from which the tag is covered; None for no such time."""
-    tag_hidden_below_m: float | None = None
+    tag_hidden_below_m: NotNegative | None = None
     """Height of the camera above the tag at which, when first reached, the tag is covered; None for no such height."""
-    tag_hidden_for_s: float = 2.0
+    tag_hidden_for_s: NotNegative = 2.0
     """How long the tag stays covered."""
     dead_lights: tuple[str, ...] = ()
     """Names of the station's lights that do not shine."""
-
-    def __post_init__(self) -> None:
-        """Refuse times and heights that mean nothing."""
-        for name in ("tag_hidden_from_s", "tag_hidden_below_m"):
-            value = getattr(self, name)
-            if value is not None and not value >= 0.0:
-                raise ConfigError(name, value, "0 or more, or nothing")
-        if not self.tag_hidden_for_s >= 0.0:
-            raise ConfigError("tag_hidden_for_s", self.tag_hidden_for_s, "a time of 0 s or more")
 
 
 class TagCover:

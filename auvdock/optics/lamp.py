@@ -18,13 +18,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import NotNegative, PositiveShare, between
 from auvdock.optics.lamp_light import add_beamed
 from auvdock.optics.lens import Lens
 from auvdock.optics.light import beam_profile, profile_solid_angle_sr
@@ -41,29 +44,23 @@ _GRID = (25, 19)
 
 
 @dataclass(frozen=True)
-class LampCfg:
+class LampCfg(Checked):
     """One or more equal lamps, rigid to the camera and parallel to its axis; all figures are ours."""
 
-    power_w: float = 20.0
+    power_w: NotNegative = 20.0
     """Electrical power of each lamp."""
-    efficiency: float = 0.35
+    efficiency: PositiveShare = 0.35
     """Radiant flux over electrical power."""
-    beam_angle_deg: float = 70.0
+    beam_angle_deg: Annotated[float, between(5.0, 170.0)] = 70.0
     """Full beam angle at half of the peak intensity."""
-    band_shares: tuple[float, float, float] = (0.4, 0.4, 0.2)
+    band_shares: tuple[NotNegative, NotNegative, NotNegative] = (0.4, 0.4, 0.2)
     """Shares of the flux in the bands 450, 530 and 620 nm: a cold white LED."""
     positions_m: tuple[tuple[float, float, float], ...] = ((0.0, -0.25, 0.0), (0.0, 0.25, 0.0))
     """Where the lamps sit in the camera frame (x right, y down, z forward): before and behind a belly camera."""
 
     def __post_init__(self) -> None:
-        """Refuse what no lamp can be."""
-        if not (math.isfinite(self.power_w) and self.power_w >= 0.0):
-            raise ConfigError("power_w", self.power_w, "a power of 0 W or more")
-        if not 0.0 < self.efficiency <= 1.0:
-            raise ConfigError("efficiency", self.efficiency, "a fraction above 0 and up to 1")
-        if not 5.0 <= self.beam_angle_deg <= 170.0:
-            raise ConfigError("beam_angle_deg", self.beam_angle_deg, "a full angle of 5 to 170 degrees")
-        if any(share < 0.0 for share in self.band_shares) or not 0.0 < sum(self.band_shares) <= 1.0 + 1e-9:
+        """Refuse more light than there is, and no lamp."""
+        if not 0.0 < sum(self.band_shares) <= 1.0 + 1e-9:
             raise ConfigError("band_shares", self.band_shares, "shares of 0 or more that add up to at most 1")
         if not self.positions_m:
             raise ConfigError("positions_m", self.positions_m, "at least one lamp; 'lamp' left out for none")

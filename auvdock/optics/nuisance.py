@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "DaylightLevel",
     "FlickerLevel",
     "InterferenceLevel",
+    "Level",
     "NuisanceCfg",
     "ReflectionLevel",
     "SnowLevel",
@@ -24,7 +26,9 @@ __all__ = [
     "nuisance_streams",
 ]
 
-LEVELS = ("none", "mild", "moderate", "severe")
+Level = Literal["none", "mild", "moderate", "severe"]
+"""How hard a part makes the scene."""
+LEVELS: tuple[Level, ...] = get_args(Level)
 """Names of the levels of each part."""
 
 
@@ -131,25 +135,19 @@ L = TypeVar("L")
 
 
 @dataclass(frozen=True)
-class NuisanceCfg:
+class NuisanceCfg(Checked):
     """What makes a scene hard, part by part; each is "none", "mild", "moderate" or "severe"."""
 
-    flicker: str = "none"
+    flicker: Level = "none"
     """Scintillation and dropouts of the lamps."""
-    marine_snow: str = "none"
+    marine_snow: Level = "none"
     """Flakes and passing occlusions."""
-    interfering_lights: str = "none"
+    interfering_lights: Level = "none"
     """Lamps that are not the station's."""
-    surface_reflection: str = "none"
+    surface_reflection: Level = "none"
     """The lamps' mirror images in the sea surface."""
-    daylight: str = "none"
+    daylight: Level = "none"
     """Night, dusk, overcast, noon."""
-
-    def __post_init__(self) -> None:
-        """Check the names."""
-        for part in PARTS:
-            if getattr(self, part) not in LEVELS:
-                raise ConfigError(part, getattr(self, part), f"one of {', '.join(LEVELS)}")
 
     @property
     def flicker_level(self) -> FlickerLevel:

@@ -14,8 +14,10 @@ from scipy.special import ndtri
 
 from auvdock.assets import asset, asset_names
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import TagDetection
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import NotNegative, Positive, Share
 from auvdock.core.strict import load_toml
 from auvdock.optics.scene import LitScene
 from auvdock.optics.tag_scene import TagView
@@ -37,7 +39,7 @@ _SHARES = np.linspace(0.0, 1.0, 33) ** 2
 
 
 @dataclass(frozen=True)
-class TagModelCfg:
+class TagModelCfg(Checked):
     """Behaviour of one tag detector.
 
     A tag that lies with its white margin in the image is found with probability
@@ -52,37 +54,25 @@ class TagModelCfg:
     """The detector."""
     source: str
     """What it was fitted on."""
-    cell_50_px: float
+    cell_50_px: Positive
     """Cell at which half of the tags of good contrast are found."""
-    cell_slope: float
+    cell_slope: Positive
     """Steepness in ln(cell)."""
-    snr_50: float
+    snr_50: Positive
     """Contrast over noise at which half of the tags of good size are found."""
-    snr_slope: float
+    snr_slope: Positive
     """Steepness in ln(contrast over noise)."""
-    ceiling: float
+    ceiling: Share
     """Probability of finding a large tag of good contrast."""
-    cut_share: float
+    cut_share: Share
     """In place of `ceiling` when the white margin, but not the black square, leaves the image."""
-    corner_floor_px: float
+    corner_floor_px: NotNegative
     """Standard deviation of a corner of a tag of good contrast, per axis."""
-    corner_noise_px: float
+    corner_noise_px: NotNegative
     """In addition this over q, per axis."""
     corner_inward: float
     """Share of `TagSight.spread_px` by which the corners are found too far inside: 1 for a detector that seeks edges
     half way between the codes of black and white, 0 for one that undoes the sensor's response first."""
-
-    def __post_init__(self) -> None:
-        """Refuse what is no probability or no width."""
-        for name in ("cell_50_px", "cell_slope", "snr_50", "snr_slope"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(name, getattr(self, name), "a number above 0")
-        for name in ("corner_floor_px", "corner_noise_px"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(name, getattr(self, name), "0 or more")
-        for name in ("ceiling", "cut_share"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ConfigError(name, getattr(self, name), "a probability of 0 to 1")
 
 
 class TagSight(NamedTuple):

@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.assets import asset
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import between
 from auvdock.core.strict import load_toml, names_file
 from auvdock.optics.bands import BANDS_NM, interpolate_bands
 
@@ -19,33 +22,25 @@ __all__ = ["WaterCfg", "load_water", "with_attenuation"]
 _GREATEST_PER_M = 100.0
 """Of absorption and scattering: no light is left after 10 cm; the muddiest estuaries have some 50 1/m."""
 
+_PerM = Annotated[float, between(0.0, _GREATEST_PER_M)]
+
 
 @dataclass(frozen=True)
-class WaterCfg:
+class WaterCfg(Checked):
     """Inherent optical properties of a homogeneous water in the bands 450, 530 and 620 nm."""
 
     name: str
     """Name of the preset."""
     source: str
     """Where the figures come from and which of them are interpolated."""
-    absorption_per_m: tuple[float, float, float]
+    absorption_per_m: tuple[_PerM, _PerM, _PerM]
     """Absorption coefficient a in 1/m per band."""
-    scattering_per_m: tuple[float, float, float]
+    scattering_per_m: tuple[_PerM, _PerM, _PerM]
     """Scattering coefficient b in 1/m per band."""
-    scattering_angle_rad: float = 0.05
+    scattering_angle_rad: Annotated[float, between(0.001, 0.5)] = 0.05
     """θ0 of Wells (1973), 0.02 to 0.1: one scattering event deflects by less than 1.7 θ0 half of the time."""
-    backscatter_ratio: float = 0.018
+    backscatter_ratio: Annotated[float, between(0.0, 0.5)] = 0.018
     """Backward over total scattering, b_b / b (Petzold 1972, average particle)."""
-
-    def __post_init__(self) -> None:
-        """Refuse what no water can be."""
-        for name in ("absorption_per_m", "scattering_per_m"):
-            if not all(0.0 <= value <= _GREATEST_PER_M for value in getattr(self, name)):
-                raise ConfigError(name, getattr(self, name), f"three coefficients of 0 to {_GREATEST_PER_M:g} 1/m")
-        if not 0.001 <= self.scattering_angle_rad <= 0.5:
-            raise ConfigError("scattering_angle_rad", self.scattering_angle_rad, "an angle of 0.001 to 0.5 rad")
-        if not 0.0 <= self.backscatter_ratio <= 0.5:
-            raise ConfigError("backscatter_ratio", self.backscatter_ratio, "a fraction of 0 to 0.5")
 
     @property
     def absorption(self) -> Array:

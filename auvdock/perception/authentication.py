@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import AcuteDeg, Count, Positive, Share, at_least
 from auvdock.perception.proposals import propose, surest_lights
 from auvdock.perception.tracker import LightTracker
 
@@ -25,41 +27,26 @@ __all__ = ["AuthenticationCfg", "Authenticator", "symmetric_pairs"]
 
 
 @dataclass(frozen=True)
-class AuthenticationCfg:
+class AuthenticationCfg(Checked):
     """When a light is believed to be a beacon."""
 
-    min_occurrences: int = 3
+    min_occurrences: Count = 3
     """Detections within the tracker's window (algorithm 1, line 6)."""
-    min_confidence: float = 0.2
+    min_confidence: Share = 0.2
     """Mean score of those detections (algorithm 1, line 6)."""
-    min_beacons: int = 4
+    min_beacons: Annotated[int, at_least(4, "PnP needs 4")] = 4
     """Beacons that a proposal must find."""
-    max_candidates: int = 12
+    max_candidates: Count = 12
     """Only the surest candidates are tried."""
-    max_angle_deg: float = 25.0
+    max_angle_deg: AcuteDeg = 25.0
     """Greatest difference in direction between a pair in the image and the opposite pair it claims to be. The ring of
     six repeats every 60°, so 30° is the limit of what can be told apart."""
-    tolerance: float = 0.2
+    tolerance: Positive = 0.2
     """Greatest distance between a candidate and where a beacon must be, over the array's radius in the image."""
-    tolerance_px: float = 1.5
+    tolerance_px: Positive = 1.5
     """Added to it for noise."""
-    proposals: int = 3
+    proposals: Count = 3
     """Best proposals handed to the pose solver."""
-
-    def __post_init__(self) -> None:
-        """Refuse thresholds without meaning."""
-        if self.min_beacons < 4:
-            raise ConfigError("min_beacons", self.min_beacons, "4 or more, PnP needs 4")
-        if not 0.0 < self.max_angle_deg <= 90.0:
-            raise ConfigError("max_angle_deg", self.max_angle_deg, "an angle above 0 and up to 90")
-        if not 0.0 <= self.min_confidence <= 1.0:
-            raise ConfigError("min_confidence", self.min_confidence, "a fraction of 0 to 1")
-        for name in ("min_occurrences", "proposals", "max_candidates"):
-            if getattr(self, name) < 1:
-                raise ConfigError(name, getattr(self, name), "1 or more")
-        for name in ("tolerance", "tolerance_px"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a value above 0")
 
 
 class Authenticator:

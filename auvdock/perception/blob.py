@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import NotNegative, Positive, at_least, at_most
 from auvdock.numeric.constants import HALF_SCORE_SNR
 from auvdock.perception.flux import spot_flux
 from auvdock.perception.spots import brightest_channel, inside, light_class, noise_sigma
@@ -19,16 +22,16 @@ __all__ = ["BlobCfg", "BlobDetector"]
 
 
 @dataclass(frozen=True)
-class BlobCfg:
+class BlobCfg(Checked):
     """Settings of the blob detector."""
 
-    min_threshold: float = 30.0
+    min_threshold: NotNegative = 30.0
     """First grey level at which the image is cut."""
-    max_threshold: float = 255.0
+    max_threshold: Annotated[float, at_most(255.0)] = 255.0
     """Last grey level."""
-    threshold_step: float = 15.0
+    threshold_step: Annotated[float, at_least(1.0)] = 15.0
     """Step between levels."""
-    min_area_px: float = 4.0
+    min_area_px: Positive = 4.0
     """Smaller blobs are noise."""
     max_area_px: float = 2000.0
     """Larger blobs are haze."""
@@ -44,13 +47,11 @@ class BlobCfg:
     """Measure each light's flux as well."""
 
     def __post_init__(self) -> None:
-        """Refuse thresholds without meaning."""
-        if not 0.0 <= self.min_threshold < self.max_threshold <= 255.0:
-            raise ConfigError("min_threshold", self.min_threshold, "0 <= min_threshold < max_threshold <= 255")
-        if not self.threshold_step >= 1.0:
-            raise ConfigError("threshold_step", self.threshold_step, "1 or more")
-        if not 0.0 < self.min_area_px < self.max_area_px:
-            raise ConfigError("min_area_px", self.min_area_px, "0 < min_area_px < max_area_px")
+        """Refuse empty ranges."""
+        if self.min_threshold >= self.max_threshold:
+            raise ConfigError("min_threshold", self.min_threshold, "less than max_threshold")
+        if self.min_area_px >= self.max_area_px:
+            raise ConfigError("min_area_px", self.min_area_px, "less than max_area_px")
 
 
 class BlobDetector:

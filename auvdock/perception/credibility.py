@@ -25,7 +25,8 @@ from scipy.special import chdtri
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.camera import Camera
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import OpenShare, Positive
 from auvdock.perception.pnp import PnpSolution
 
 __all__ = ["Credibility", "CredibilityCfg"]
@@ -39,37 +40,28 @@ _UNIT_MARGIN = 2.0
 
 
 @dataclass(frozen=True)
-class CredibilityCfg:
+class CredibilityCfg(Checked):
     """When a solved pose is believed; all thresholds are ours."""
 
-    fit_probability: float = 0.003
+    fit_probability: OpenShare = 0.003
     """A right pose fits worse, or steps farther, with this probability each; one that does is not believed."""
-    max_range_sigma: float = 0.1
+    max_range_sigma: Positive = 0.1
     """Greatest σ_r over the range ..."""
-    max_range_sigma_m: float = 0.3
+    max_range_sigma_m: Positive = 0.3
     """... and σ_r that is always good enough: both are the error from which on an episode counts a pose as false."""
-    max_range_m: float = 60.0
+    max_range_m: Positive = 60.0
     """Lamps are seen no farther than this in any water (paper B saw a 30 W beacon at 50 m)."""
-    speed_error_m_s: float = 0.5
+    speed_error_m_s: Positive = 0.5
     """The vehicle's way between two poses is known by its DVL to this speed: its noise, the hull's turning, which moves
     the camera, acceleration since the last pose (ours)."""
-    mirror_log_odds: float = 6.9
+    mirror_log_odds: Positive = 6.9
     """Where the station's heading is not known: least natural logarithm of how much likelier a pose is than the other
     pose of the lights' plane; a thousand to one."""
-    detection_probability: float = 0.9
+    detection_probability: OpenShare = 0.9
     """Share of the beacons in view that a detector finds, for the odds of a new identification."""
     min_log_odds: float = 6.9
     """Least natural logarithm of (probability of these lights if they are the beacons, over that if they are not): a
     thousand to one, as in a landing."""
-
-    def __post_init__(self) -> None:
-        """Refuse what no check can use."""
-        for name in ("fit_probability", "detection_probability"):
-            if not 0.0 < getattr(self, name) < 1.0:
-                raise ConfigError(name, getattr(self, name), "a probability above 0 and below 1")
-        for name in ("max_range_sigma", "max_range_sigma_m", "max_range_m", "speed_error_m_s", "mirror_log_odds"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a value above 0")
 
 
 class Credibility:

@@ -17,8 +17,9 @@ from scipy.optimize import linear_sum_assignment
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import BLUE, Detections
-from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, Positive
 from auvdock.perception.association import Associated, pose_estimate
 from auvdock.perception.credibility import Credibility, CredibilityCfg
 from auvdock.perception.pnp import PnpCfg, PnpSolver
@@ -29,25 +30,17 @@ __all__ = ["HungarianRansacAssociation", "HungarianRansacCfg"]
 
 
 @dataclass(frozen=True)
-class HungarianRansacCfg:
+class HungarianRansacCfg(Checked):
     """Settings of the comparison."""
 
-    gate_px: float = 25.0
+    gate_px: Positive = 25.0
     """Greatest distance of a light from where its beacon was in the last frame."""
-    ransac_px: float = 5.0
+    ransac_px: Positive = 5.0
     """Inlier threshold (published program: 5)."""
-    ransac_iterations: int = 100
+    ransac_iterations: Count = 100
     """Published program: 100."""
     hold_last: bool = False
     """Repeat the last pose on failure, marked as not measured."""
-
-    def __post_init__(self) -> None:
-        """Refuse thresholds without meaning."""
-        for name in ("gate_px", "ransac_px"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a distance above 0 px")
-        if self.ransac_iterations < 1:
-            raise ConfigError("ransac_iterations", self.ransac_iterations, "1 or more")
 
 
 class HungarianRansacAssociation:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Bearing
-from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, PositiveShare, at_least
 from auvdock.perception.pnp import PnpSolution
 from auvdock.perception.sights import (
     CENTRE,
@@ -31,26 +33,17 @@ _NO_POSE = np.zeros(0)
 
 
 @dataclass(frozen=True)
-class LineOfSightCfg:
+class LineOfSightCfg(Checked):
     """When a light is steady enough to steer by."""
 
-    min_occurrences: int = 3
+    min_occurrences: Count = 3
     """Detections within the tracker's window: a light seen once or twice does not steer."""
     max_missed: int = 5
     """A light may be bridged by prediction for this many frames."""
-    group_size: int = 3
+    group_size: Annotated[int, at_least(2)] = 3
     """From this many blue lights on, the group's centre is the target and its spread gives a rough range."""
-    loyalty: float = 0.7
+    loyalty: PositiveShare = 0.7
     """A single light is kept until another scores more than its own score over this."""
-
-    def __post_init__(self) -> None:
-        """Refuse thresholds without meaning."""
-        if self.min_occurrences < 1:
-            raise ConfigError("min_occurrences", self.min_occurrences, "1 or more")
-        if self.group_size < 2:
-            raise ConfigError("group_size", self.group_size, "2 or more")
-        if not 0.0 < self.loyalty <= 1.0:
-            raise ConfigError("loyalty", self.loyalty, "a fraction above 0 and up to 1")
 
 
 class LineOfSight:

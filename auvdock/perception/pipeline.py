@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections, Percept, Proprioception
 from auvdock.core.errors import ConfigError
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
@@ -24,21 +26,22 @@ from auvdock.perception.rotating.forward_beacon import ForwardBeacon
 from auvdock.perception.spatiotemporal import SpatiotemporalAssociation
 from auvdock.perception.tracker import LightTracker, TrackerCfg
 
-__all__ = ["ASSOCIATIONS", "BeaconPerception", "PerceptionCfg"]
+__all__ = ["ASSOCIATIONS", "AssociationName", "BeaconPerception", "PerceptionCfg"]
 
 _LEAST_SIGMA_RAD = math.radians(1.0)
 """What compass and clock leave of the station's heading at best (ours)."""
-ASSOCIATIONS = ("spatiotemporal", "hungarian_ransac")
+AssociationName = Literal["spatiotemporal", "hungarian_ransac"]
 """Ways to tell which light is which beacon."""
+ASSOCIATIONS: tuple[AssociationName, ...] = get_args(AssociationName)
 
 
 @dataclass(frozen=True)
-class PerceptionCfg:
+class PerceptionCfg(Checked):
     """How the vehicle sees."""
 
     detector: str = "threshold"
     """"threshold", "blob" or a detector of your own as "package.module:Name"."""
-    association: str = "spatiotemporal"
+    association: AssociationName = "spatiotemporal"
     """"spatiotemporal" (paper A's method) or "hungarian_ransac" (its comparison)."""
     station_yaw_deg: float = 0.0
     """Heading of the station's approach axis in the world, as surveyed."""
@@ -58,9 +61,7 @@ class PerceptionCfg:
     """The rotating beacon, where the station has one."""
 
     def __post_init__(self) -> None:
-        """Check the association's name; the detector's is checked when it is made."""
-        if self.association not in ASSOCIATIONS:
-            raise ConfigError("association", self.association, f"one of {', '.join(ASSOCIATIONS)}")
+        """Refuse a light that no history is long enough to confirm."""
         if self.authentication.min_occurrences > self.tracker.window_frames:
             raise ConfigError(
                 "authentication.min_occurrences",

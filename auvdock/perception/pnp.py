@@ -18,7 +18,8 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import NotNegative, Positive
 from auvdock.numeric.lights import (
     ATTITUDE,
     COST,
@@ -43,27 +44,19 @@ _DECREMENT_TRACKED = 1e-4
 
 
 @dataclass(frozen=True)
-class PnpCfg:
+class PnpCfg(Checked):
     """How poses are solved and checked."""
 
-    max_reprojection_px: float = 2.0
+    max_reprojection_px: Positive = 2.0
     """A mean reprojection error above this means that identities are wrong."""
-    attitude_sigma_deg: float = 5.0
+    attitude_sigma_deg: Positive = 5.0
     """Trust in the vehicle's own attitude when it decides between the two poses of a plane."""
-    max_attitude_error_deg: float = 40.0
+    max_attitude_error_deg: Positive = 40.0
     """A pose turned farther than this from the vehicle's own attitude is refused."""
-    attitude_prior_sigma_deg: float = 5.0
+    attitude_prior_sigma_deg: NotNegative = 5.0
     """The vehicle's attitude enters the least squares with this σ per axis; 0 leaves the pose to light alone, as in
     paper A. Beyond some 8 m light alone hardly tells how the array is turned, and the two poses of its plane melt into
     one that may be 30° off and carries the position with it."""
-
-    def __post_init__(self) -> None:
-        """Refuse what no check can use."""
-        for name in ("max_reprojection_px", "attitude_sigma_deg", "max_attitude_error_deg"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a value above 0")
-        if self.attitude_prior_sigma_deg < 0.0:
-            raise ConfigError("attitude_prior_sigma_deg", self.attitude_prior_sigma_deg, "0 or more")
 
 
 class PnpSolution(NamedTuple):

@@ -15,8 +15,9 @@ import cv2
 import numpy as np
 
 from auvdock.core.arrays import Image
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections, Frame, RegionOfInterest
-from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, Positive
 from auvdock.numeric.constants import HALF_SCORE_SNR
 from auvdock.perception.components import components
 from auvdock.perception.flux import DISC_RAD, spot_flux
@@ -32,33 +33,24 @@ _LARGE_PX = 300
 
 
 @dataclass(frozen=True)
-class ThresholdCfg:
+class ThresholdCfg(Checked):
     """Settings of the threshold detector."""
 
-    noise_factor: float = 6.0
+    noise_factor: Positive = 6.0
     """Threshold above the background in σ of the noise."""
-    min_contrast: float = 8.0
+    min_contrast: Positive = 8.0
     """Threshold above the background in grey levels, at least."""
-    min_area_px: int = 3
+    min_area_px: Count = 3
     """Smaller components are noise."""
-    background_px: int = 40
+    background_px: Count = 40
     """What is broader than this is background; more than the largest core, less than the spacing of the lights matters
     little."""
-    max_lights: int = 32
+    max_lights: Count = 32
     """Only the components of greatest contrast are kept."""
     flux: bool = False
     """Measure each light's flux as well."""
-    flux_disc_rad: float = DISC_RAD
+    flux_disc_rad: Positive = DISC_RAD
     """Radius of the disc in which it is measured: a lone, blurred light asks for more, close neighbours for less."""
-
-    def __post_init__(self) -> None:
-        """Refuse thresholds without meaning."""
-        for name in ("noise_factor", "min_contrast", "flux_disc_rad"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a value above 0")
-        for name in ("min_area_px", "background_px", "max_lights"):
-            if getattr(self, name) < 1:
-                raise ConfigError(name, getattr(self, name), "1 or more")
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,15 @@ covariance, so a track's 4 × 4 covariance is three numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from auvdock.core.arrays import Array, IntArray
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections
-from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, Positive, at_least, between
 from auvdock.numeric.tracks import COVARIANCE, DETECTION, HISTORY, LABELS, STATE
 from auvdock.perception.track_filter import advance, distances, filter_terms, settle
 from auvdock.perception.views import TrackViews
@@ -31,38 +32,25 @@ _VIEWS = ("numbers", "labels", "state", "covariance", "history", *_LABEL_VIEWS)
 
 
 @dataclass(frozen=True)
-class TrackerCfg:
+class TrackerCfg(Checked):
     """How lights are tracked."""
 
-    pixel_sigma_px: float = 0.5
+    pixel_sigma_px: Positive = 0.5
     """σ of a detection's centre at full confidence; R = σ² / (score + 0.1)."""
-    acceleration_px_s2: float = 200.0
+    acceleration_px_s2: Positive = 200.0
     """σ_a, standard deviation of a light's acceleration in the image."""
-    initial_speed_px_s: float = 120.0
+    initial_speed_px_s: Positive = 120.0
     """Standard deviation of a new track's unknown velocity."""
-    gate_sigmas: float = 5.0
+    gate_sigmas: Positive = 5.0
     """A detection farther than this from the prediction is another light."""
-    max_predicted_frames: int = 10
+    max_predicted_frames: Annotated[int, at_least(0)] = 10
     """A confirmed track outlives this many frames without a detection and dies at the next (paper A: 10)."""
-    confirm_hits: int = 3
+    confirm_hits: Count = 3
     """Detections after which a track is confirmed."""
-    max_tentative_frames: int = 2
+    max_tentative_frames: Annotated[int, at_least(0)] = 2
     """An unconfirmed track outlives this many frames without a detection."""
-    window_frames: int = 6
+    window_frames: Annotated[int, between(1, 1000)] = 6
     """Length of the history that authentication looks back on."""
-
-    def __post_init__(self) -> None:
-        """Refuse what no filter can use."""
-        for name in ("pixel_sigma_px", "acceleration_px_s2", "initial_speed_px_s", "gate_sigmas"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a value above 0")
-        if self.confirm_hits < 1:
-            raise ConfigError("confirm_hits", self.confirm_hits, "1 or more")
-        if not 1 <= self.window_frames <= 1000:
-            raise ConfigError("window_frames", self.window_frames, "1 to 1000 frames")
-        for name in ("max_predicted_frames", "max_tentative_frames"):
-            if getattr(self, name) < 0:
-                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 class LightTracker:

@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconCfg, BeaconLayout
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Positive, at_least, at_most, between
 from auvdock.planning.paper_a import PaperALamp
 
 __all__ = ["ArrayBounds", "ArrayDesign", "bounds_of", "decode", "paper_lamps", "physical_layout", "ring_vector"]
 
 
 @dataclass(frozen=True)
-class ArrayBounds:
+class ArrayBounds(Checked):
     """What the optimiser may choose from."""
 
-    lights: int = 6
+    lights: Annotated[int, between(4, 16)] = 6
     """Number of lights; an odd one stands on the upright plane."""
-    min_radius_m: float = 0.5
+    min_radius_m: Positive = 0.5
     """Least distance from the axis."""
     max_radius_m: float = 1.0
     """Greatest distance from the axis: the mouth's rim."""
@@ -29,25 +32,19 @@ class ArrayBounds:
     """Least inward tilt; negative is outwards."""
     max_tilt_deg: float = 30.0
     """Greatest inward tilt."""
-    min_beam_deg: float = 5.0
+    min_beam_deg: Annotated[float, at_least(1.0)] = 5.0
     """Narrowest beam, full angle."""
-    max_beam_deg: float = 70.0
+    max_beam_deg: Annotated[float, at_most(179.0)] = 70.0
     """Widest beam."""
     min_gap_m: float = 0.3
     """Least distance between two lights."""
 
     def __post_init__(self) -> None:
         """Refuse bounds that hold no layout."""
-        if not 4 <= self.lights <= 16:
-            raise ConfigError("lights", self.lights, "4 to 16 lights")
         for name in ("radius_m", "tilt_deg", "beam_deg"):
             low, high = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
-            if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+            if low > high:
                 raise ConfigError(f"min_{name}", low, f"a number of at most max_{name} ({high:g})")
-        if not self.min_radius_m > 0.0:
-            raise ConfigError("min_radius_m", self.min_radius_m, "a length above 0 m")
-        if not 1.0 <= self.min_beam_deg <= self.max_beam_deg <= 179.0:
-            raise ConfigError("min_beam_deg", self.min_beam_deg, "beam angles of 1 to 179 degrees")
         if self.min_gap_m * self.lights > 2.0 * math.pi * self.max_radius_m:
             raise ConfigError("min_gap_m", self.min_gap_m, f"less: {self.lights} lights do not fit on the rim")
 

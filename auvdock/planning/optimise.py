@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 from scipy.optimize import differential_evolution
 
 from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import Count, Positive, above, at_least, between
 from auvdock.planning.array_design import (
     ArrayBounds,
     ArrayDesign,
@@ -25,48 +27,33 @@ from auvdock.planning.paper_a import PaperAGrid, PaperALightCfg, count_visible, 
 from auvdock.planning.pose_error import position_sigma_m
 from auvdock.planning.region import PlanCfg, make_detectability
 
-__all__ = ["GOALS", "Found", "OptimiseCfg", "optimise_paper", "optimise_physical", "physical_score"]
+__all__ = ["Found", "OptimiseCfg", "optimise_paper", "optimise_physical", "physical_score"]
 
-GOALS = ("volume", "volume_per_watt", "pose_error")
 UNSEEN_ERROR_M = 2.0
 """Pose error that stands for a place from which too few lights are found."""
 
 
 @dataclass(frozen=True)
-class OptimiseCfg:
+class OptimiseCfg(Checked):
     """The search."""
 
-    goal: str = "volume"
+    goal: Literal["volume", "volume_per_watt", "pose_error"] = "volume"
     """"volume", "volume_per_watt" (power is free up to the given one) or "pose_error"."""
     bounds: ArrayBounds = ArrayBounds()
-    power_w: float = 60.0
+    power_w: Positive = 60.0
     """Electrical power of the whole array; for "volume_per_watt" the most it may take."""
-    generations: int = 20
+    generations: Count = 20
     """Generations of differential evolution."""
-    population: int = 16
+    population: Annotated[int, at_least(5)] = 16
     """Layouts in a generation."""
-    directions: int = 72
+    directions: Annotated[int, at_least(8)] = 72
     """Directions, over a quarter sphere, at which the region is probed."""
-    ranges: int = 18
+    ranges: Annotated[int, at_least(4)] = 18
     """Ranges at which it is probed in each direction."""
-    cone_deg: float = 90.0
+    cone_deg: Annotated[float, between(5.0, 90.0)] = 90.0
     """Only places within this angle of the approach axis count; 90 is all that lies before the mouth."""
-    reach_m: float = 32.0
+    reach_m: Annotated[float, above(1.0)] = 32.0
     """Greatest range that is probed."""
-
-    def __post_init__(self) -> None:
-        """Refuse searches without sense."""
-        if self.goal not in GOALS:
-            raise ConfigError("goal", self.goal, f"one of {', '.join(GOALS)}")
-        if not (math.isfinite(self.power_w) and self.power_w > 0.0):
-            raise ConfigError("power_w", self.power_w, "a power above 0 W")
-        for name, least in (("generations", 1), ("population", 5), ("directions", 8), ("ranges", 4)):
-            if getattr(self, name) < least:
-                raise ConfigError(name, getattr(self, name), f"{least} or more")
-        if not 5.0 <= self.cone_deg <= 90.0:
-            raise ConfigError("cone_deg", self.cone_deg, "5 to 90 degrees")
-        if not self.reach_m > 1.0:
-            raise ConfigError("reach_m", self.reach_m, "more than 1 m")
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,8 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial import ConvexHull, QhullError
 
 from auvdock.core.arrays import Array, BoolArray, IntArray
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import NotNegative, Positive
 
 __all__ = [
     "PaperAGrid",
@@ -45,24 +46,24 @@ _TURBULENCE_SPAN_M = 8.0
 
 
 @dataclass(frozen=True)
-class PaperALightCfg:
+class PaperALightCfg(Checked):
     """Parameters of the model: the defaults of the authors' published simulator, and the readings that were tried."""
 
-    intensity: float = 10.0
+    intensity: Positive = 10.0
     """I, radiant intensity before it is spread over the beam; no unit is given."""
-    absorption_per_m: float = 0.18
+    absorption_per_m: NotNegative = 0.18
     """a at 450 nm."""
-    scattering_per_m: float = 0.10
+    scattering_per_m: NotNegative = 0.10
     """b at 450 nm."""
     asymmetry: float = 0.95
     """g of the phase function."""
-    concentration_kg_m3: float = 0.13
+    concentration_kg_m3: NotNegative = 0.13
     """C, of particles, at 10 m depth."""
-    reference_distance_m: float = 1.0
+    reference_distance_m: Positive = 1.0
     """d₀ of the diffusion term."""
-    diffusion_exponent: float = 1.2
+    diffusion_exponent: Positive = 1.2
     """n of the diffusion term."""
-    threshold: float = 0.02
+    threshold: Positive = 0.02
     """I_min."""
     turbulence: bool = True
     """Tilt the beams by the frozen field."""
@@ -74,15 +75,6 @@ class PaperALightCfg:
     """Measure θ from the station's origin, as the text says, instead of from the lamp."""
     power_law_diffusion: bool = False
     """f_d = (d₀ / d)^n, another reading of the lost equation."""
-
-    def __post_init__(self) -> None:
-        """Refuse what gives no light."""
-        for name in ("intensity", "reference_distance_m", "diffusion_exponent", "threshold"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ConfigError(name, getattr(self, name), "a finite number above 0")
-        for name in ("absorption_per_m", "scattering_per_m", "concentration_kg_m3"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(name, getattr(self, name), "0 or more")
 
 
 @dataclass(frozen=True)

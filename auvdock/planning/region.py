@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera, CameraCfg, make_camera
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, between
 from auvdock.optics.detection_model import load_detection_model
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.water import load_water, with_attenuation
@@ -27,7 +30,7 @@ _CAP_DIRECTIONS = 1500
 
 
 @dataclass(frozen=True)
-class PlanCfg:
+class PlanCfg(Checked):
     """What the region depends on besides the station."""
 
     water: str = "pool"
@@ -36,17 +39,10 @@ class PlanCfg:
     """Beam attenuation at 450 nm in 1/m in place of the preset's."""
     camera: CameraCfg = CameraCfg()
     imaging: ImagingCfg = ImagingCfg()
-    min_lights: int = 4
+    min_lights: Count = 4
     """Array lights that must be found; PnP needs 4."""
-    resolution: int = 56
+    resolution: Annotated[int, between(16, 400)] = 56
     """Voxels along the longest side of the region's bounding box."""
-
-    def __post_init__(self) -> None:
-        """Refuse what gives no region."""
-        if self.min_lights < 1:
-            raise ConfigError("min_lights", self.min_lights, "1 or more")
-        if not 16 <= self.resolution <= 400:
-            raise ConfigError("resolution", self.resolution, "16 to 400 voxels")
 
 
 @dataclass(frozen=True, eq=False)

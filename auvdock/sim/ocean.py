@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.core.arrays import Array
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import Positive, between
 from auvdock.sim.stepping import flow
 
 __all__ = ["CurrentCfg", "Ocean"]
@@ -16,32 +18,23 @@ __all__ = ["CurrentCfg", "Ocean"]
 _BLOCK = 512
 """Gust samples drawn at once: one call of the generator costs as much as fifty samples."""
 
+_Speed = Annotated[float, between(0.0, 5.0)]
+
 
 @dataclass(frozen=True)
-class CurrentCfg:
+class CurrentCfg(Checked):
     """A horizontal, irrotational current in the world frame."""
 
-    speed_m_s: float = 0.0
+    speed_m_s: _Speed = 0.0
     """Mean speed at the depth of the station's mouth."""
     direction_deg: float = 0.0
     """Where the water flows to: world azimuth, counter-clockwise from +x."""
     shear_per_m: float = 0.0
     """Relative change of the mean speed per metre upwards: speed × (1 + shear × height above the mouth), at least 0."""
-    gust_std_m_s: float = 0.0
+    gust_std_m_s: _Speed = 0.0
     """Standard deviation of each horizontal gust component."""
-    gust_time_constant_s: float = 10.0
+    gust_time_constant_s: Positive = 10.0
     """Correlation time of the gusts."""
-
-    def __post_init__(self) -> None:
-        """Refuse what no water does."""
-        for name in ("speed_m_s", "gust_std_m_s"):
-            if not 0.0 <= getattr(self, name) <= 5.0:
-                raise ConfigError(name, getattr(self, name), "a speed of 0 to 5 m/s")
-        for name in ("direction_deg", "shear_per_m"):
-            if not math.isfinite(getattr(self, name)):
-                raise ConfigError(name, getattr(self, name), "a finite number")
-        if not self.gust_time_constant_s > 0.0:
-            raise ConfigError("gust_time_constant_s", self.gust_time_constant_s, "a time above 0 s")
 
 
 class Ocean:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Proprioception
-from auvdock.core.errors import ConfigError
+from auvdock.core.limits import NotNegative
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.scalars import within_pi
 
@@ -17,39 +17,33 @@ __all__ = ["SensorCfg", "Sensors"]
 
 
 @dataclass(frozen=True)
-class SensorCfg:
+class SensorCfg(Checked):
     """Noise of each sample (white) and bias (drawn once an episode); both are standard deviations."""
 
-    depth_noise_m: float = 0.01
+    depth_noise_m: NotNegative = 0.01
     """Pressure gauge, 0.01 % of a 100 m range (Paroscientific Digiquartz data sheet: accuracy 0.01 % of full scale)."""
-    depth_bias_m: float = 0.02
+    depth_bias_m: NotNegative = 0.02
     """Atmospheric pressure and tide left over after zeroing at the surface: 2 hPa."""
-    attitude_noise_rad: float = 0.0017
+    attitude_noise_rad: NotNegative = 0.0017
     """Roll and pitch, 0.1° (TCM-class compass modules: 0.2° accuracy)."""
-    attitude_bias_rad: float = 0.0035
+    attitude_bias_rad: NotNegative = 0.0035
     """Roll and pitch alignment, 0.2° (same data sheets)."""
-    heading_noise_rad: float = 0.0035
+    heading_noise_rad: NotNegative = 0.0035
     """Compass, 0.2° (TCM-class compass modules: 0.1° resolution, 0.05° repeatability, steel and currents near by)."""
-    heading_bias_rad: float = 0.0087
+    heading_bias_rad: NotNegative = 0.0087
     """Compass, 0.5° (OS5000- and TCM-class data sheets: 0.3° to 0.5° rms accuracy)."""
-    gyro_noise_rad_s: float = 0.0005
+    gyro_noise_rad_s: NotNegative = 0.0005
     """MEMS gyroscope, 0.007 °/s/√Hz over 15 Hz (ADIS1648x data sheets)."""
-    gyro_bias_rad_s: float = 0.0002
+    gyro_bias_rad_s: NotNegative = 0.0002
     """In-run bias after zeroing, about 40 °/h (same class, over temperature)."""
-    ground_velocity_noise_m_s: float = 0.003
+    ground_velocity_noise_m_s: NotNegative = 0.003
     """DVL bottom lock (Teledyne RDI Workhorse Navigator 1200 kHz: 0.3 cm/s at 1 m/s, single ping)."""
-    water_velocity_noise_m_s: float = 0.01
+    water_velocity_noise_m_s: NotNegative = 0.01
     """DVL water track: shorter cells and fewer scatterers, some three times the bottom lock's."""
-    velocity_scale_error: float = 0.002
+    velocity_scale_error: NotNegative = 0.002
     """DVL scale error (same data sheet: ±0.2 %)."""
-    contact_threshold_n: float = 5.0
+    contact_threshold_n: NotNegative = 5.0
     """Force that closes the touch switch: the bow's, in landing the underside's."""
-
-    def __post_init__(self) -> None:
-        """Refuse negative deviations."""
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ConfigError(name, value, "0 or more")
 
 
 _BLOCK = 64

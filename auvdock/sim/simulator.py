@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from auvdock.core.arrays import Array, check_shape
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Proprioception
-from auvdock.core.errors import ConfigError
+from auvdock.core.limits import between
 from auvdock.core.stations import StationCfg
 from auvdock.core.transforms import make_transform, rotation_from_quat_wxyz
 from auvdock.core.vehicle import VehicleCfg, load_vehicle
@@ -33,20 +34,15 @@ _HISTORY_STEPS = 240
 
 
 @dataclass(frozen=True)
-class SimCfg:
+class SimCfg(Checked):
     """Vehicle, current, sensors and physics rate."""
 
     vehicle: str = "remus_hybrid"
     """Vehicle preset."""
     current: CurrentCfg = CurrentCfg()
     sensors: SensorCfg = SensorCfg()
-    physics_hz: float = 120.0
+    physics_hz: Annotated[float, between(100.0, 2000.0, "contacts need some 100 Hz")] = 120.0
     """Physics steps a second."""
-
-    def __post_init__(self) -> None:
-        """Contacts need some 100 Hz; beyond 2000 Hz nothing is gained."""
-        if not 100.0 <= self.physics_hz <= 2000.0:
-            raise ConfigError("physics_hz", self.physics_hz, "a rate of 100 to 2000 Hz")
 
 
 class HistoryEntry(NamedTuple):

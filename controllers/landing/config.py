@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from auvdock.controllers.allocation import AllocationCfg
+from auvdock.controllers.allocation import AllocationCfg, Preload
 from auvdock.controllers.autopilot import AutopilotCfg
-from auvdock.controllers.gains import DesignCfg
+from auvdock.controllers.gains import Crossover, DesignCfg, PhaseMargin
 from auvdock.controllers.landing.guidance import LandingGuidanceCfg
 from auvdock.controllers.landing.modes import LandingModeCfg
 from auvdock.controllers.landing.search import SpiralCfg
 from auvdock.controllers.relative_state import FilterCfg
+from auvdock.core.checked import Checked
+from auvdock.core.limits import Positive
 
 __all__ = ["HoverAllocationCfg", "HoverAutopilotCfg", "HoverDesignCfg", "HoverFilterCfg", "LandingControlCfg"]
 
@@ -21,15 +23,15 @@ class HoverDesignCfg(DesignCfg):
 
     surge_m_s: float = 0.1
     """Speed through the water at which the vehicle is linearised: a station-keeping vehicle's in a weak current."""
-    surge_crossover_rad_s: float = 1.9
+    surge_crossover_rad_s: Crossover = 1.9
     """Gain crossover of the surge speed loop."""
-    sway_crossover_rad_s: float = 2.2
+    sway_crossover_rad_s: Crossover = 2.2
     """Gain crossover of the sway velocity loop."""
-    velocity_margin_deg: float = 60.0
+    velocity_margin_deg: PhaseMargin = 60.0
     """Phase margin for which the velocity loops are designed."""
-    pitch_crossover_rad_s: float = 2.5
+    pitch_crossover_rad_s: Crossover = 2.5
     """Gain crossover of the pitch loop."""
-    roll_crossover_rad_s: float = 2.5
+    roll_crossover_rad_s: Crossover = 2.5
     """Gain crossover of the roll loop, where thrusters act on roll."""
 
 
@@ -39,9 +41,9 @@ class HoverAutopilotCfg(AutopilotCfg):
 
     design: HoverDesignCfg = HoverDesignCfg()
     """What the loops shall achieve."""
-    current_time_constant_s: float = 0.4
+    current_time_constant_s: Positive = 0.4
     """Smoothing of the measured water velocity: gusts are fed forward as soon as the DVL's noise allows."""
-    sway_acceleration_m_s2: float = 0.25
+    sway_acceleration_m_s2: Positive = 0.25
     """Fastest change of the sway and heave references: a descent must be stopped within decimetres."""
 
 
@@ -49,7 +51,7 @@ class HoverAutopilotCfg(AutopilotCfg):
 class HoverAllocationCfg(AllocationCfg):
     """Allocation for a vehicle that hovers, often with next to no thrust."""
 
-    preload: float = 0.03
+    preload: Preload = 0.03
     """Vectored thrusters push against each other with 0.9 N of a T200's 30 N: twice its dead band."""
 
 
@@ -57,18 +59,18 @@ class HoverAllocationCfg(AllocationCfg):
 class HoverFilterCfg(FilterCfg):
     """Relative filter over a few metres, where poses are good to a centimetre and dead reckoning to millimetres."""
 
-    position_walk_m_rs: float = 0.006
+    position_walk_m_rs: Positive = 0.006
     """Dead reckoning: a DVL of 3 mm/s at 20 Hz makes 0.7 mm/√s, its scale error and the compass a few more."""
-    heading_walk_rad_rs: float = 0.002
+    heading_walk_rad_rs: Positive = 0.002
     """The bearing of the station's axis."""
-    position_floor_m: float = 0.005
+    position_floor_m: Positive = 0.005
     """Added to a measured position's standard deviation."""
-    rotation_floor_rad: float = 0.015
+    rotation_floor_rad: Positive = 0.015
     """Added to a measured rotation's standard deviation: inclinometer, compass and the station's own tilt."""
 
 
 @dataclass(frozen=True)
-class LandingControlCfg:
+class LandingControlCfg(Checked):
     """Settings of the landing pilot."""
 
     autopilot: HoverAutopilotCfg = HoverAutopilotCfg()

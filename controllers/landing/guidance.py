@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Positive
 
 __all__ = ["Flat", "LandingGuidanceCfg", "Place", "corridor_m", "sink_m_s", "station_keeping"]
 
@@ -15,45 +17,42 @@ Flat = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class LandingGuidanceCfg:
+class LandingGuidanceCfg(Checked):
     """Speeds, corridor and station keeping; all values are ours."""
 
-    position_gain_1_s: float = 0.7
+    position_gain_1_s: Positive = 0.7
     """Station keeping: speed per metre of offset, a third of the velocity loops' crossover."""
-    integral_gain_1_s2: float = 0.01
+    integral_gain_1_s2: Positive = 0.01
     """Station keeping: speed per metre and second of offset, against what the velocity loops leave of the current."""
-    integral_zone_m: float = 0.1
+    integral_zone_m: Positive = 0.1
     """Offsets beyond this are not integrated."""
-    max_integral_m_s: float = 0.03
+    max_integral_m_s: Positive = 0.03
     """Greatest speed that the integral may ask for."""
-    approach_speed_m_s: float = 0.3
+    approach_speed_m_s: Positive = 0.3
     """Greatest horizontal speed on the way to the station."""
-    align_speed_m_s: float = 0.15
+    align_speed_m_s: Positive = 0.15
     """Greatest horizontal speed above it."""
-    touchdown_speed_m_s: float = 0.05
+    touchdown_speed_m_s: Positive = 0.05
     """Greatest horizontal speed between the guides, where the hull may already touch."""
-    height_gain_1_s: float = 0.5
+    height_gain_1_s: Positive = 0.5
     """Vertical speed per metre of height error when a height is held."""
-    climb_speed_m_s: float = 0.25
+    climb_speed_m_s: Positive = 0.25
     """Greatest vertical speed, up or down, apart from the descent."""
-    sink_gain_1_s: float = 0.3
+    sink_gain_1_s: Positive = 0.3
     """Descent: sink speed per metre of height above the seat."""
-    max_sink_m_s: float = 0.25
+    max_sink_m_s: Positive = 0.25
     """Greatest sink speed (paper C gives none)."""
-    touchdown_sink_m_s: float = 0.07
+    touchdown_sink_m_s: Positive = 0.07
     """Sink speed onto the guides, the least of the descent."""
-    corridor_m: float = 0.03
+    corridor_m: Positive = 0.03
     """Half width of the corridor at touchdown: inside what the latch can catch."""
-    corridor_slope: float = 0.12
+    corridor_slope: Positive = 0.12
     """The corridor widens by this with height."""
-    max_corridor_m: float = 0.3
+    max_corridor_m: Positive = 0.3
     """Greatest half width."""
 
     def __post_init__(self) -> None:
-        """All are positive, and the descent slows down."""
-        for name, value in vars(self).items():
-            if not value > 0.0:
-                raise ConfigError(name, value, "a value above 0")
+        """Refuse a descent that does not slow down, or a corridor that narrows with height."""
         if self.touchdown_sink_m_s > self.max_sink_m_s:
             raise ConfigError("touchdown_sink_m_s", self.touchdown_sink_m_s, "at most max_sink_m_s")
         if self.corridor_m > self.max_corridor_m:

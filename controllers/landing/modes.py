@@ -31,7 +31,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, Positive
 
 __all__ = [
     "ABORT",
@@ -65,65 +67,62 @@ LANDING_TRANSITIONS: dict[str, frozenset[str]] = {
 
 
 @dataclass(frozen=True)
-class LandingModeCfg:
+class LandingModeCfg(Checked):
     """Thresholds of the mode machine; all values are ours. Heights are of the seat above its place in the guides."""
 
-    confirm_sights: int = 3
+    confirm_sights: Count = 3
     """Frames in a row with the lights before approach begins without a pose."""
-    confirm_fixes: int = 5
+    confirm_fixes: Count = 5
     """Accepted poses before they count."""
-    fresh_s: float = 0.3
+    fresh_s: Positive = 0.3
     """A pose is fresh this long."""
-    sight_lost_s: float = 3.0
+    sight_lost_s: Positive = 3.0
     """Approach ends when neither pose nor lights were seen for this long."""
-    search_timeout_s: float = 150.0
+    search_timeout_s: Positive = 150.0
     """Longest search."""
-    approach_timeout_s: float = 60.0
+    approach_timeout_s: Positive = 60.0
     """Longest approach."""
-    standoff_m: float = 2.0
+    standoff_m: Positive = 2.0
     """Height at which the vehicle aligns: all five lights and the tag are in the image."""
-    min_blind_height_m: float = 2.0
+    min_blind_height_m: Positive = 2.0
     """Without a fresh pose the vehicle never goes lower than this of its own will, the committed descent apart."""
-    near_m: float = 0.5
+    near_m: Positive = 0.5
     """Approach ends within this horizontal distance and height of the standoff point; align ends at twice that."""
-    settle_s: float = 1.5
+    settle_s: Positive = 1.5
     """Time inside the corridor before the descent."""
-    max_heading_deg: float = 2.5
+    max_heading_deg: Positive = 2.5
     """Greatest heading error in the descent (paper C steers to within 3°)."""
-    align_timeout_s: float = 60.0
+    align_timeout_s: Positive = 60.0
     """Longest align."""
-    brief_s: float = 0.7
+    brief_s: Positive = 0.7
     """A descent goes on this long without a pose, ever slower."""
-    pose_lost_s: float = 3.5
+    pose_lost_s: Positive = 3.5
     """Align and descend wait this long for a pose before they give in."""
-    commit_height_m: float = 0.35
+    commit_height_m: Positive = 0.35
     """At and below this height the descent may end by dead reckoning."""
-    commit_s: float = 10.0
+    commit_s: Positive = 10.0
     """Longest committed descent without a pose."""
-    max_sigma_m: float = 0.03
+    max_sigma_m: Positive = 0.03
     """Greatest horizontal standard deviation in descend, low down, and in touchdown."""
-    leave_factor: float = 1.5
+    leave_factor: Positive = 1.5
     """The descent is interrupted at this multiple of the corridor's half width, and of the heading limit."""
-    touchdown_height_m: float = 0.12
+    touchdown_height_m: Positive = 0.12
     """Height at which the final sink begins."""
-    stall_s: float = 2.0
+    stall_s: Positive = 2.0
     """No progress downwards for this long while sinking means that the vehicle rests on something."""
-    progress_m: float = 0.02
+    progress_m: Positive = 0.02
     """Smaller ways down do not count as progress."""
-    seated_m: float = 0.05
+    seated_m: Positive = 0.05
     """Resting higher than this is not on the seat; and twice as deep below it no estimate is right."""
-    touchdown_timeout_s: float = 12.0
+    touchdown_timeout_s: Positive = 12.0
     """Longest touchdown."""
-    abort_timeout_s: float = 30.0
+    abort_timeout_s: Positive = 30.0
     """Longest climb."""
-    max_attempts: int = 3
+    max_attempts: Count = 3
     """Landings begun before the pilot gives up."""
 
     def __post_init__(self) -> None:
-        """All are positive; touchdown, commitment and standoff lie in this order."""
-        for name, value in vars(self).items():
-            if not value > 0:
-                raise ConfigError(name, value, "a value above 0")
+        """Touchdown, commitment and standoff lie in this order."""
         if not self.touchdown_height_m < self.commit_height_m < self.standoff_m:
             raise ConfigError("commit_height_m", self.commit_height_m, "touchdown_height_m < it < standoff_m")
         if not self.brief_s < self.pose_lost_s:

@@ -8,37 +8,32 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import NotNegative, Positive
 
 __all__ = ["SpiralCfg", "spiral", "spiral_pass"]
 
 
 @dataclass(frozen=True)
-class SpiralCfg:
+class SpiralCfg(Checked):
     """The search pattern; all values are ours."""
 
-    settle_s: float = 2.0
+    settle_s: NotNegative = 2.0
     """Wait on the spot before the first turn: perception needs some frames."""
-    height_m: float = 4.5
+    height_m: Positive = 4.5
     """The seat is taken at least so high above its place on the station: the view widens with height."""
-    high_s: float = 60.0
+    high_s: Positive = 60.0
     """Time on the high spiral, at that height, before the low one has its turn."""
-    low_s: float = 30.0
+    low_s: Positive = 30.0
     """Time on the low one, at the least height that is allowed without a pose."""
-    climb_m_s: float = 0.2
+    climb_m_s: Positive = 0.2
     """Vertical speed between them."""
-    pitch_m: float = 1.2
+    pitch_m: Positive = 1.2
     """Distance between two turns of the spiral."""
-    speed_m_s: float = 0.25
+    speed_m_s: Positive = 0.25
     """Speed along it."""
-    max_radius_m: float = 5.0
+    max_radius_m: Positive = 5.0
     """The spiral ends in a circle of this radius."""
-
-    def __post_init__(self) -> None:
-        """All are positive; the wait may be none."""
-        for name, value in vars(self).items():
-            if not (value > 0.0 or (name == "settle_s" and value == 0.0)):
-                raise ConfigError(name, value, "a value above 0")
 
 
 def spiral_pass(time_s: float, cfg: SpiralCfg) -> tuple[bool, float]:

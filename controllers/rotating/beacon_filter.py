@@ -18,7 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, Positive
 
 __all__ = ["BeaconFilter", "BeaconFilterCfg", "BeaconState", "Hypothesis", "Sighting"]
 
@@ -28,42 +30,39 @@ _POSE_SIGMA_RAD = 0.02
 
 
 @dataclass(frozen=True)
-class BeaconFilterCfg:
+class BeaconFilterCfg(Checked):
     """Noise levels and ranges of the filter bank; all ours."""
 
-    min_range_m: float = 6.0
+    min_range_m: Positive = 6.0
     """Nearest range that a first sight may have."""
-    max_range_m: float = 75.0
+    max_range_m: Positive = 75.0
     """Farthest one."""
-    hypotheses: int = 7
+    hypotheses: Count = 7
     """Filters of the bank, at ranges in geometric progression."""
-    bearing_floor_rad: float = 0.006
+    bearing_floor_rad: Positive = 0.006
     """Standard deviation of a compass bearing to the beacon: compass noise, tilt, centre of a haloed spot."""
-    azimuth_floor_rad: float = 0.008
+    azimuth_floor_rad: Positive = 0.008
     """Added to a fix's own standard deviation: errors of successive turns are alike."""
-    position_walk_m_rs: float = 0.03
+    position_walk_m_rs: Positive = 0.03
     """Dead reckoning: standard deviation of position after 1 s, growing with the square root of time."""
-    heading_walk_rad_rs: float = 0.001
+    heading_walk_rad_rs: Positive = 0.001
     """The same for the bearing of the station's axis."""
-    elevation_floor_rad: float = 0.012
+    elevation_floor_rad: Positive = 0.012
     """Standard deviation of the beacon's elevation: inclinometer bias, centre of a haloed spot."""
-    depth_walk_m_rs: float = 0.01
+    depth_walk_m_rs: Positive = 0.01
     """Walk of the beacon's depth as the pressure gauge counts it."""
-    gate: float = 18.4
+    gate: Positive = 18.4
     """Greatest squared Mahalanobis distance of an accepted fix: 99.99 % of χ² with 2 degrees of freedom."""
-    restart_after: int = 4
+    restart_after: Count = 4
     """So many refused fixes in a row start the bank anew: the estimate, not the fixes, is then wrong."""
-    finer: float = 0.4
+    finer: Positive = 0.4
     """Two refused fixes in a row are enough if they are so much finer than the finest that the bank rests on: a few
     dim frames at the edge of the beam make a coarse fix whose error is not random."""
-    drop_weight: float = 1e-3
+    drop_weight: Positive = 1e-3
     """A hypothesis below this weight is dropped."""
 
     def __post_init__(self) -> None:
-        """All are positive and the ranges in order."""
-        for name, value in vars(self).items():
-            if not value > 0:
-                raise ConfigError(name, value, "a value above 0")
+        """Refuse ranges out of order."""
         if self.min_range_m >= self.max_range_m:
             raise ConfigError("min_range_m", self.min_range_m, "less than max_range_m")
 

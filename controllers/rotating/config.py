@@ -8,12 +8,13 @@ from auvdock.controllers.rotating.beacon_filter import BeaconFilterCfg
 from auvdock.controllers.rotating.modes import RotatingModeCfg
 from auvdock.controllers.rotating.route import RouteCfg
 from auvdock.controllers.rotating.steering import CourseCfg, LookAroundCfg
+from auvdock.core.checked import Checked
 
 __all__ = ["RotatingControlCfg"]
 
 
 @dataclass(frozen=True)
-class RotatingControlCfg:
+class RotatingControlCfg(Checked):
     """Everything that can be set about the way to the cone before the mouth."""
 
     look: LookAroundCfg = LookAroundCfg()

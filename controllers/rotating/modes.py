@@ -23,7 +23,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from auvdock.controllers.modes import ABORT, ACQUIRE, FAR, MID
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import Count, Positive
 
 __all__ = ["APPROACH", "CIRCLE", "LINEUP", "ROTATING_MODES", "RotatingFacts", "RotatingModeCfg", "next_rotating_mode"]
 
@@ -33,33 +34,27 @@ ROTATING_MODES = (ACQUIRE, APPROACH, CIRCLE, LINEUP)
 
 
 @dataclass(frozen=True)
-class RotatingModeCfg:
+class RotatingModeCfg(Checked):
     """Thresholds of these modes; all ours."""
 
-    confirm_fixes: int = 2
+    confirm_fixes: Count = 2
     """Fixes before the vehicle sets off."""
-    range_share: float = 0.15
+    range_share: Positive = 0.15
     """The range is known when its standard deviation is this share of it."""
-    approach_timeout_s: float = 60.0
+    approach_timeout_s: Positive = 60.0
     """Longest approach."""
-    lineup_blind_s: float = 6.0
+    lineup_blind_s: Positive = 6.0
     """Lineup without a fix before a fixed lamp may lead instead."""
-    lineup_timeout_s: float = 120.0
+    lineup_timeout_s: Positive = 120.0
     """Longest lineup."""
-    min_blind_m: float = 5.0
+    min_blind_m: Positive = 5.0
     """Nearer than this before the mouth there must have been a pose."""
-    lost_s: float = 30.0
+    lost_s: Positive = 30.0
     """Without a fix for so long, the beacon is searched for again."""
-    pose_cone_rad: float = 0.35
+    pose_cone_rad: Positive = 0.35
     """Half angle about the axis within which poses take over: from farther aside the array is seen too obliquely."""
-    steady_sights: int = 15
+    steady_sights: Count = 15
     """Frames in a row with a fixed lamp that make it steady."""
-
-    def __post_init__(self) -> None:
-        """All are positive."""
-        for name, value in vars(self).items():
-            if not value > 0:
-                raise ConfigError(name, value, "a value above 0")
 
 
 class RotatingFacts(NamedTuple):

@@ -9,33 +9,32 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Positive
 
 __all__ = ["Leg", "RouteCfg", "route"]
 
 
 @dataclass(frozen=True)
-class RouteCfg:
+class RouteCfg(Checked):
     """Sizes of the way around; all ours."""
 
     centre_x_m: float = -1.35
     """Middle of the station's body: mouth at 0, end of the tube at -2.7 m."""
-    radius_m: float = 12.0
+    radius_m: Positive = 12.0
     """The way around keeps so far off that middle."""
-    gate_m: float = 15.0
+    gate_m: Positive = 15.0
     """Where the way around ends: on the axis, so far before the mouth."""
-    cone_rad: float = 0.14
+    cone_rad: Positive = 0.14
     """Half angle about the axis, seen from the beacon, in which the way around is over."""
-    push: float = 0.25
+    push: Positive = 0.25
     """Inside the disc the course turns outwards by so many radians per metre."""
-    side_from_rad: float = 2.4
+    side_from_rad: Positive = 2.4
     """Beyond this azimuth the side once chosen is kept: noise about ±180° must not turn the vehicle back and forth."""
 
     def __post_init__(self) -> None:
-        """All but the centre are positive, and the gate lies outside the disc."""
-        for name in ("radius_m", "gate_m", "cone_rad", "push", "side_from_rad"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(name, getattr(self, name), "a value above 0")
+        """Refuse a gate inside the disc."""
         if self.gate_m - self.centre_x_m <= self.radius_m:
             raise ConfigError("gate_m", self.gate_m, "a place outside the disc about centre_x_m")
 

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
 from auvdock.controllers.senses import Senses, Vector
 from auvdock.controllers.steering import Steering, ground_course
-from auvdock.core.errors import ConfigError
+from auvdock.core.checked import Checked
+from auvdock.core.limits import NotNegative, Positive, at_least
 
 __all__ = ["CourseCfg", "LookAroundCfg", "look_around", "steer_course"]
 
+_Some = Annotated[float, at_least(1e-6)]
+
 
 @dataclass(frozen=True)
-class LookAroundCfg:
+class LookAroundCfg(Checked):
     """The look around for the beacon; ours.
 
     At 0.5 rev/s the beam comes by every 2 s, and the camera sees 85°: at 0.35 rad/s (20°/s) a direction stays in the
@@ -22,63 +26,50 @@ class LookAroundCfg:
     `hold_s`, in which a beacon shows itself by passing again.
     """
 
-    turn_rate_rad_s: float = 0.35
+    turn_rate_rad_s: _Some = 0.35
     """Rate of the turn."""
-    hold_s: float = 8.0
+    hold_s: _Some = 8.0
     """Watch a light that appeared for so long: four turns of the beacon."""
-    hold_gap_rad: float = 0.9
+    hold_gap_rad: _Some = 0.9
     """Turn on by so much after a light that was watched in vain."""
-    hold_score: float = 0.3
+    hold_score: NotNegative = 0.3
     """Least score of a light that is worth it."""
-    settle_s: float = 1.0
+    settle_s: NotNegative = 1.0
     """Wait before the first turn."""
-    believed_s: float = 7.0
+    believed_s: NotNegative = 7.0
     """Look so long to where the beacon was last believed."""
-    leg_m: float = 8.0
+    leg_m: _Some = 8.0
     """Way between two full turns; every second way is longer by this much: a square spiral."""
-    leg_speed_m_s: float = 0.7
+    leg_speed_m_s: _Some = 0.7
     """Speed on it."""
-    depth_step_m: float = 1.5
+    depth_step_m: NotNegative = 1.5
     """Every second round runs so much higher, every fourth so much deeper: a beam of 10° is thin near by."""
-
-    def __post_init__(self) -> None:
-        """All are positive, but for the waits and the step."""
-        for name, value in vars(self).items():
-            low = 0.0 if name in ("settle_s", "believed_s", "depth_step_m", "hold_score") else 1e-6
-            if not (math.isfinite(value) and value >= low):
-                raise ConfigError(name, value, "a value above 0")
 
 
 @dataclass(frozen=True)
-class CourseCfg:
+class CourseCfg(Checked):
     """Speeds and view on the way around; ours."""
 
-    speed_m_s: float = 0.9
+    speed_m_s: Positive = 0.9
     """Over ground."""
-    look_speed_m_s: float = 0.25
+    look_speed_m_s: Positive = 0.25
     """Over ground while the hull is turned towards the beacon, sideways for the most part."""
-    parallax_rad: float = 0.55
+    parallax_rad: Positive = 0.55
     """Least angle between course and beacon while the range is unknown."""
-    view_rad: float = 0.6
+    view_rad: Positive = 0.6
     """The camera's half field of view less a margin: the beacon is in sight within this angle of the bow."""
-    max_blind_s: float = 12.0
+    max_blind_s: Positive = 12.0
     """Longest way without a fix before the hull turns for a look."""
-    look_timeout_s: float = 14.0
+    look_timeout_s: Positive = 14.0
     """Longest look, turning included."""
-    max_crab_rad: float = 0.5
+    max_crab_rad: Positive = 0.5
     """Greatest angle between hull and course in a current."""
-    lineup_least_m: float = 4.0
+    lineup_least_m: Positive = 4.0
     """In lineup the vehicle aims at a place on the axis this far before itself, or farther."""
-    lineup_share: float = 2.0
+    lineup_share: Positive = 2.0
     """So many times as far as it is off the axis."""
-    depth_below_beacon_m: float = 0.4
+    depth_below_beacon_m: Positive = 0.4
     """On the way around the camera runs so much below the beacon's beam."""
-
-    def __post_init__(self) -> None:
-        """All are positive."""
-        for name, value in vars(self).items():
-            if not value > 0.0:
-                raise ConfigError(name, value, "a value above 0")
 
 
 def look_around(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from auvdock.assets import asset
-from auvdock.campaign.axes import AxisCfg, axis_kind
+from auvdock.campaign.axes import AxisCfg, Distribution, axis_kind
 from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.config import CampaignCfg, campaign_from_plain
 from auvdock.campaign.files import load_campaign
@@ -98,8 +99,8 @@ def test_values_of_another_type_are_refused_under_the_setting_s_name(name: str, 
     assert caught.value.field == name
 
 
-@pytest.mark.parametrize("distribution", ["uniform", "log_uniform", "normal"])
-def test_whole_numbers_are_drawn_whole(distribution: str):
+@pytest.mark.parametrize("distribution", get_args(Distribution))
+def test_whole_numbers_are_drawn_whole(distribution: Distribution):
     axis = AxisCfg("world.station.array_count", low=4, high=9, distribution=distribution)
     drawn = [axis.drawn(place, int) for place in np.linspace(0.0, 1.0, 601)]
     assert set(drawn) == set(range(4, 10))

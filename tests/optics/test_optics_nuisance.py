@@ -125,7 +125,7 @@ def test_same_seed_same_frames():
 
 def test_unknown_levels_are_refused():
     with pytest.raises(ConfigError, match=r"^flicker: "):
-        NuisanceCfg(flicker="wild")
+        dataclasses.replace(NuisanceCfg(), flicker="wild")
     with pytest.raises(ConfigError, match="moderate"):
         nuisance_preset("wild")
     assert nuisance_preset("none") == NuisanceCfg()

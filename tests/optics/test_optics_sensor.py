@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -83,7 +85,7 @@ def test_same_stream_same_bits():
 @pytest.mark.parametrize(
     ("make", "field"),
     [
-        (lambda: ImagingCfg(encoding="log"), "encoding"),
+        (lambda: replace(ImagingCfg(), encoding="log"), "encoding"),
         (lambda: ImagingCfg(full_well_e=0.0), "full_well_e"),
         (lambda: ImagingCfg(lamp_spill=1.5), "lamp_spill"),
         (lambda: ImagingCfg(read_noise_e=float("nan")), "read_noise_e"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from landing_scenes import CAMERA, STATION, Descent, Senses
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Detections, PoseEstimate, TagDetection
 from auvdock.core.errors import ConfigError
-from auvdock.perception.landing.config import LandingPerceptionCfg
+from auvdock.perception.landing.config import Fusion, LandingPerceptionCfg
 from auvdock.perception.landing.level import pose_offset
 from auvdock.perception.landing.pipeline import LandingPercept, LandingPerception
 
@@ -41,8 +42,8 @@ def fly(cfg: LandingPerceptionCfg, seed: int, seconds: float = 15.0) -> list[tup
     return frames
 
 
-@pytest.mark.parametrize("fusion", ["ekf", "weighted"])
-def test_descent(fusion: str):
+@pytest.mark.parametrize("fusion", get_args(Fusion))
+def test_descent(fusion: Fusion):
     """After 5 s: within 10 mm and 1° in 95 % of frames, the whole descent with a pose; levels hand over."""
     frames = fly(LandingPerceptionCfg(fusion=fusion), 3)
     assert all(percept.pose is not None for _, percept in frames[3:])

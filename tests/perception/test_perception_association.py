@@ -24,7 +24,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.contracts import RED, Detections, Percept
 from auvdock.core.errors import ConfigError
 from auvdock.perception.hungarian_ransac import HungarianRansacCfg
-from auvdock.perception.pipeline import ASSOCIATIONS, BeaconPerception, PerceptionCfg
+from auvdock.perception.pipeline import ASSOCIATIONS, AssociationName, BeaconPerception, PerceptionCfg
 
 RING = LAYOUT.positions_m[ARRAY]
 RING_AND_FAR = LAYOUT.positions_m[[*ARRAY, FAR]]
@@ -89,7 +89,7 @@ def position_error_m(percept: Percept, truth: Array) -> float:
 
 
 @pytest.mark.parametrize("association", ASSOCIATIONS)
-def test_nothing_seen(association: str):
+def test_nothing_seen(association: AssociationName):
     run = Run(1, PerceptionCfg(association=association))
     for _ in range(20):
         percept = run.show(hidden=(0, 1, 2, 3, 4, 5))
@@ -101,7 +101,7 @@ def test_nothing_seen(association: str):
 
 
 @pytest.mark.parametrize("association", ASSOCIATIONS)
-def test_approach_is_followed(association: str):
+def test_approach_is_followed(association: AssociationName):
     """All lights, 3 s from 6 m: always a pose after 3 frames, every identity right.
 
     Position errors of 0.6 m at most and 0.3 m rms: 0.5 px tell the direction of the axis to some 2°.
@@ -320,7 +320,7 @@ def test_authentication_outlasts_the_comparison():
 
 def test_unknown_association_names_the_known():
     with pytest.raises(ConfigError, match="spatiotemporal, hungarian_ransac"):
-        PerceptionCfg(association="magic")
+        replace(PerceptionCfg(), association="magic")
 
 
 def test_other_classes_are_not_authenticated():

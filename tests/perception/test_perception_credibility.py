@@ -26,7 +26,7 @@ from auvdock.core.contracts import BLUE, Detections
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 from auvdock.perception.credibility import Credibility, CredibilityCfg
-from auvdock.perception.pipeline import ASSOCIATIONS, BeaconPerception, PerceptionCfg
+from auvdock.perception.pipeline import ASSOCIATIONS, AssociationName, BeaconPerception, PerceptionCfg
 from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
 
 RING = LAYOUT.positions_m[ARRAY]
@@ -94,7 +94,9 @@ def test_a_range_is_believed_as_far_as_the_span_of_the_lights_tells_it(credibili
 @pytest.mark.parametrize("association", ASSOCIATIONS)
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), spread_px=st.floats(0.0, 4.0), lights=st.integers(4, 8))
-def test_lights_within_a_few_pixels_are_no_array(association: str, seed: int, spread_px: float, lights: int):
+def test_lights_within_a_few_pixels_are_no_array(
+    association: AssociationName, seed: int, spread_px: float, lights: int
+):
     """Also with one light given twice (spread 0): never a measured pose."""
     rng = np.random.default_rng(seed)
     perception = BeaconPerception(PerceptionCfg(association=association), CAMERA, LAYOUT)

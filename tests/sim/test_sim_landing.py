@@ -208,8 +208,9 @@ def test_contact_gives_no_energy(name: str) -> None:
 
 
 def test_hull_parts_are_refused_if_they_are_none() -> None:
+    box = HullPartCfg("x", "box", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     with pytest.raises(ConfigError, match="shape"):
-        HullPartCfg("x", "sphere", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+        dataclasses.replace(box, shape="sphere")
     with pytest.raises(ConfigError, match="diameter"):
         HullPartCfg("x", "cylinder", (0.0, 0.0, 0.0), (1.0, 0.2, 0.3))
     (torpedo,) = load_vehicle("remus_hybrid").hull_parts

@@ -12,13 +12,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated
 
 import cv2
 import numpy as np
 
 from auvdock.core.arrays import Array, Image, IntArray
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import BLUE, RED, Detections, Frame, RegionOfInterest
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, OpenShare, at_least
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import HALF_SCORE_SNR
 from auvdock.perception.components import peaked_components
@@ -31,36 +35,27 @@ _BORDER_PX = 4
 
 
 @dataclass(frozen=True)
-class CoreCfg:
+class CoreCfg(Checked):
     """Settings of the core detector; ours."""
 
-    levels: tuple[float, ...] = (0.97, 0.92, 0.86, 0.79, 0.71, 0.62, 0.53)
+    levels: tuple[OpenShare, ...] = (0.97, 0.92, 0.86, 0.79, 0.71, 0.62, 0.53)
     """Cuts, as shares of the brightest code above the median; the last is how dim a light may be beside the
     brightest."""
-    prominence: float = 0.06
+    prominence: OpenShare = 0.06
     """How far a light's peak stands above the cut at which it comes off its neighbours, as the same share."""
-    min_contrast: float = 12.0
+    min_contrast: Annotated[float, at_least(1.0)] = 12.0
     """An image whose brightest code is less above its median holds no light, nor one less than eight σ of the noise."""
-    min_area_px: int = 1
+    min_area_px: Count = 1
     """Smaller components, at half the resolution, are noise."""
-    max_aspect: float = 1.8
+    max_aspect: Annotated[float, at_least(1.0)] = 1.8
     """A component longer than this times its width is two lights grown together, or none."""
-    max_lights: int = 16
+    max_lights: Count = 16
     """Only the brightest components are kept."""
 
     def __post_init__(self) -> None:
-        """Refuse cuts without meaning."""
-        falling = all(a > b for a, b in zip(self.levels, self.levels[1:], strict=False))
-        if not self.levels or not falling or not 0.0 < self.levels[-1] or not self.levels[0] < 1.0:
+        """Refuse cuts that do not fall."""
+        if not self.levels or any(a <= b for a, b in pairwise(self.levels)):
             raise ConfigError("levels", self.levels, "falling shares between 0 and 1")
-        if not 0.0 < self.prominence < 1.0:
-            raise ConfigError("prominence", self.prominence, "a share between 0 and 1")
-        for name in ("min_contrast", "max_aspect"):
-            if not getattr(self, name) >= 1.0:
-                raise ConfigError(name, getattr(self, name), "1 or more")
-        for name in ("min_area_px", "max_lights"):
-            if getattr(self, name) < 1:
-                raise ConfigError(name, getattr(self, name), "1 or more")
 
 
 class CoreDetector:

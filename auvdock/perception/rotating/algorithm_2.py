@@ -11,34 +11,33 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.core.arrays import Array
+from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections
 from auvdock.core.errors import ConfigError
+from auvdock.core.limits import Count, NotNegative
 
 __all__ = ["ForwardDetection", "PaperBCfg", "PaperBForwardBeacon"]
 
 
 @dataclass(frozen=True)
-class PaperBCfg:
+class PaperBCfg(Checked):
     """Settings of algorithm 2."""
 
-    area_weight: float = 0.5
+    area_weight: NotNegative = 0.5
     """w_area; the paper gives no value (ours: both count alike)."""
-    shape_weight: float = 0.5
+    shape_weight: NotNegative = 0.5
     """w_shape; likewise."""
-    min_detections: int = 5
+    min_detections: Count = 5
     """Detections that make a pass (line 8: 5). A 10° beam at 0.5 rev/s and 30 Hz is on the camera for 1.67 frames: it
     takes the water's halo to give more."""
-    max_missed: int = 5
+    max_missed: Count = 5
     """Frames without a detection that end the pass (line 14: 5)."""
     interpolate: bool = True
     """Fill the gaps of dropped frames within a pass ("interpolation is used to fill in the gaps")."""
 
     def __post_init__(self) -> None:
-        """Refuse counts that never or always fire."""
-        for name in ("min_detections", "max_missed"):
-            if getattr(self, name) < 1:
-                raise ConfigError(name, getattr(self, name), "1 or more")
-        if not (self.area_weight >= 0.0 and self.shape_weight >= 0.0 and self.area_weight + self.shape_weight > 0.0):
+        """Refuse weights that weigh nothing."""
+        if self.area_weight + self.shape_weight <= 0.0:
             raise ConfigError("area_weight", self.area_weight, "weights of 0 or more, not both 0")
 
 
