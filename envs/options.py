@@ -9,26 +9,20 @@ from typing import Any, TypeVar
 
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import merge
-from auvdock.envs.config import StartCfg, WorldCfg
-from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.reward import RewardCfg
+from auvdock.envs.vehicle_world import WorldSettings
 
 __all__ = ["OBSERVATIONS", "check_options", "reward_settings", "world_settings"]
 
 OBSERVATIONS = ("state", "pose", "image")
 
-C = TypeVar("C", WorldCfg, LandingWorldCfg)
-T = TypeVar("T", StartCfg, LandingStartCfg, RewardCfg)
+W = TypeVar("W", bound=WorldSettings)
+T = TypeVar("T")
 
 
 def world_settings(
-    default: C,
-    cfg: WorldCfg | LandingWorldCfg | None,
-    observation: str,
-    fidelity: str | None,
-    start: StartCfg | LandingStartCfg | Mapping[str, Any] | None,
-    time_limit_s: float | None,
-) -> C:
+    default: W, cfg: W | None, observation: str, fidelity: str | None, start: object, time_limit_s: float | None
+) -> W:
     """The world that an environment's arguments ask for.
 
     Args:
@@ -36,7 +30,7 @@ def world_settings(
         cfg: the world, of the default's kind.
         observation: one of `OBSERVATIONS`.
         fidelity: in place of the `cfg`'s; without either, "pixels" for images and "beacons" for the rest.
-        start: in place of the `cfg`'s; a mapping changes only the fields that it names.
+        start: of the kind of the `cfg`'s and in its place, or a mapping that changes only the fields that it names.
         time_limit_s: in place of `cfg.limits.max_time_s`.
 
     Raises:

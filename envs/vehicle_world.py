@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import Field, dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from auvdock.assets import asset_names
 from auvdock.core.arrays import Array, Image
 from auvdock.core.camera import Camera, CameraCfg, make_camera
-from auvdock.core.contracts import Detections, Frame, Proprioception, TagDetection
+from auvdock.core.contracts import Proprioception, Sensed
 from auvdock.core.errors import ConfigError, located
 from auvdock.core.marine import flip_vector
 from auvdock.core.stations import StationCfg
@@ -28,24 +28,7 @@ from auvdock.sim.ocean import CurrentCfg
 from auvdock.sim.simulator import SimCfg, Simulator
 from auvdock.sim.truth import Truth
 
-__all__ = ["Sensed", "Start", "VehicleWorld", "WorldSettings", "detection_model", "mounted_camera"]
-
-
-@dataclass(frozen=True, eq=False)
-class Sensed:
-    """What the vehicle can know at one moment.
-
-    Attributes:
-        proprioception: its own sensors.
-        frame: a new camera frame, None between frames or where `detections` stands in for it.
-        detections: in the `beacons` fidelity, the detections of a new frame, else None.
-        tags: in the `beacons` fidelity of a landing, the tags seen in that frame.
-    """
-
-    proprioception: Proprioception
-    frame: Frame | None
-    detections: Detections | None
-    tags: tuple[TagDetection, ...] = ()
+__all__ = ["Start", "VehicleWorld", "WorldSettings", "detection_model", "mounted_camera"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +49,9 @@ class Start:
 
 
 class WorldSettings(Protocol):
-    """What the configurations of all worlds have in common."""
+    """What the configurations of all worlds, dataclasses, have in common."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
     @property
     def fidelity(self) -> str:
@@ -86,6 +71,11 @@ class WorldSettings(Protocol):
     @property
     def sim(self) -> SimCfg:
         """Vehicle, current, sensors, physics rate."""
+        ...
+
+    @property
+    def start(self) -> Any:  # noqa: ANN401 - each kind of station has starts of its own
+        """Where an episode starts."""
         ...
 
     @property
@@ -217,7 +207,7 @@ class VehicleWorld(ABC):
         """Sample the sensors now; once per control period."""
         proprioception = self.simulator.proprioception()
         if self._step_count - self._last_frame_step < self._steps_per_frame:
-            return Sensed(proprioception, None, None)
+            return Sensed(proprioception)
         self._last_frame_step = self._step_count
         self._start_camera()
         return self._look(self.truth, proprioception)

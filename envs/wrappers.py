@@ -18,13 +18,11 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from auvdock.controllers.allocation import AllocationCfg, ThrustAllocator
+from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotSetpoint
-from auvdock.controllers.landing.config import HoverAllocationCfg, HoverAutopilotCfg
 from auvdock.core.arrays import Array
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.envs.actions import checked_action
-from auvdock.envs.landing import LandingEnv
 from auvdock.envs.vehicle_env import VehicleEnv
 
 __all__ = ["BodyWrenchAction", "SetPointAction"]
@@ -33,17 +31,11 @@ _AXES = (0, 1, 2, 4, 5)
 """Surge, sway, heave, pitch, yaw."""
 
 
-def _docking(env: gymnasium.Env[Any, Any]) -> VehicleEnv:
+def _docking(env: gymnasium.Env[Any, Any]) -> VehicleEnv[Any, Any, Any]:
     inner = env.unwrapped
     if not isinstance(inner, VehicleEnv):
         raise TypeError(f"{type(inner).__name__} is no docking environment")
     return inner
-
-
-def _allocator(env: VehicleEnv) -> ThrustAllocator:
-    """Shares a wrench as the station's own pilot does."""
-    cfg = HoverAllocationCfg() if isinstance(env, LandingEnv) else AllocationCfg()
-    return ThrustAllocator(env.world.simulator.vehicle, cfg)
 
 
 def _reach(vehicle: VehicleCfg) -> Array:
@@ -62,7 +54,7 @@ class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
         """Wrap a docking environment."""
         super().__init__(env)
         inner = _docking(env)
-        self._allocator = _allocator(inner)
+        self._allocator = ThrustAllocator(inner.world.simulator.vehicle, inner.allocation_cfg)
         self._reach = _reach(inner.world.simulator.vehicle)
         self.action_space = spaces.Box(-1.0, 1.0, (len(_AXES),), np.float32)
 
@@ -97,9 +89,8 @@ class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any]):
         """
         super().__init__(env)
         inner = _docking(env)
-        own = HoverAutopilotCfg() if isinstance(inner, LandingEnv) else AutopilotCfg()
-        self._autopilot = Autopilot(inner.world.simulator.vehicle, cfg or own, inner.control_s)
-        self._allocator = _allocator(inner)
+        self._autopilot = Autopilot(inner.world.simulator.vehicle, cfg or inner.autopilot_cfg, inner.control_s)
+        self._allocator = ThrustAllocator(inner.world.simulator.vehicle, inner.allocation_cfg)
         self._state = self._autopilot.initial_state()
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
 

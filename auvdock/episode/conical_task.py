@@ -8,17 +8,14 @@ from typing import Any
 from auvdock.controllers.named import find_pilot, make_named_pilot
 from auvdock.controllers.pilot import ConicalPilot, Pilot
 from auvdock.controllers.rotating.pilot import RotatingPilot
-from auvdock.core.contracts import Percept
 from auvdock.core.errors import located
-from auvdock.envs.vehicle_world import Sensed
+from auvdock.envs.perceived import perceived_docking
 from auvdock.envs.world import DockingWorld
 from auvdock.episode.config import EpisodeCfg
 from auvdock.episode.metrics import GuidanceMetrics
 from auvdock.episode.result import stage_of
 from auvdock.episode.rotating_metrics import RotatingMetrics
 from auvdock.episode.trace import Tick
-from auvdock.perception.detectors import make_station_detector
-from auvdock.perception.pipeline import BeaconPerception
 from auvdock.sim.truth import Truth
 
 __all__ = ["ConicalTask"]
@@ -31,41 +28,19 @@ class ConicalTask:
     """Implements `auvdock.episode.task.Task` for `EpisodeCfg`."""
 
     def __init__(self, cfg: EpisodeCfg) -> None:
-        """Build world, detector, perception and pilot.
+        """Build world, perception and pilot.
 
         Raises:
             ConfigError: a name that does not exist or a value that does not fit.
         """
-        self._cfg = cfg
         self.station = cfg.world.station
         self.name = "conical station" if self.station.rotating is None else "rotating beacon"
         self.detector = cfg.perception.detector
-        with located("perception."):
-            self._detector = make_station_detector(self.detector, self.station)
         with located("control."):
             find_pilot(cfg.control.controller)  # before the world, whose loops may have to be compiled
-        self.world = DockingWorld(cfg.world, self.detector)
-        self._perception = BeaconPerception(
-            cfg.perception,
-            self.world.camera,
-            self.station.layout,
-            self.station.rotating,
-            heading_surveyed=cfg.world.station_heading == "surveyed",
-        )
+        self.world, self.perceiver = perceived_docking(cfg.world, cfg.perception)
         with located("control."):
             self.pilot = make_pilot(cfg, self.world)
-
-    def reset(self) -> None:
-        """Forget the tracks."""
-        self._perception.reset()
-
-    def perceive(self, sensed: Sensed) -> Percept | None:
-        """Perception's answer to what was sensed; None if there was no new frame."""
-        if sensed.frame is not None:
-            return self._perception.update(self._detector.detect(sensed.frame), sensed.proprioception)
-        if sensed.detections is not None:
-            return self._perception.update(sensed.detections, sensed.proprioception)
-        return None
 
     def metrics(self) -> ConicalMetrics:
         """Metrics of a new episode."""

@@ -10,9 +10,7 @@ from importlib.metadata import version
 import cv2
 import numpy as np
 
-from auvdock.core.contracts import Percept
 from auvdock.core.strict import to_plain
-from auvdock.envs.vehicle_world import Sensed
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.task import TaskMetrics, make_task
@@ -38,7 +36,7 @@ class EpisodeRunner:
     """Runs episodes of one configuration; reusable, since building the world costs more than resetting it."""
 
     def __init__(self, cfg: AnyEpisodeCfg) -> None:
-        """Build world, detector, perception and pilot.
+        """Build world, perception and pilot.
 
         Raises:
             ConfigError: a name that does not exist or a value that does not fit.
@@ -46,13 +44,10 @@ class EpisodeRunner:
         self.cfg = cfg
         self.task = make_task(cfg)
         self.world = self.task.world
+        self.perceiver = self.task.perceiver
         self.pilot = self.task.pilot
         self._plain_config = to_plain(cfg)
         self._versions = software_versions()
-
-    def perceive(self, sensed: Sensed) -> Percept | None:
-        """Perception's answer to what was sensed; None if there was no new frame."""
-        return self.task.perceive(sensed)
 
     def run(self, seed: int, observers: Sequence[EpisodeObserver] = ()) -> EpisodeResult:
         """Run one episode to its end.
@@ -84,11 +79,11 @@ class EpisodeRunner:
     def _ticks(self, seed: int, flight: _Flight) -> Iterator[Tick]:
         world = self.world
         world.reset(seed)
-        self.task.reset()
+        self.perceiver.reset()
         state = self.pilot.initial_state()
         while True:
             sensed = world.sense()
-            percept = self.perceive(sensed)
+            percept = self.perceiver.perceive(sensed)
             command, state = self.pilot.step(state, percept, sensed.proprioception)
             flight.count(command.mode)
             image = sensed.frame.image if sensed.frame is not None else None

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from auvdock.controllers.pilot import Pilot
-from auvdock.core.contracts import Percept
 from auvdock.core.stations import StationCfg
-from auvdock.envs.vehicle_world import Sensed, VehicleWorld
+from auvdock.envs.vehicle_world import VehicleWorld
 from auvdock.episode.config import AnyEpisodeCfg, LandingEpisodeCfg
 from auvdock.episode.conical_task import ConicalTask
 from auvdock.episode.landing_task import LandingTask
 from auvdock.episode.trace import Tick
+from auvdock.perception.perceiver import Perceiver
 from auvdock.sim.truth import Truth
 
 __all__ = ["Task", "TaskMetrics", "make_task"]
@@ -58,12 +58,9 @@ class Task(Protocol):
         """Flies the vehicle."""
         ...
 
-    def reset(self) -> None:
-        """Forget the episode before; the world is reset apart from this."""
-        ...
-
-    def perceive(self, sensed: Sensed) -> Percept | None:
-        """Perception's answer to what was sensed; None if there was no new frame."""
+    @property
+    def perceiver(self) -> Perceiver:
+        """Makes percepts of what the vehicle senses."""
         ...
 
     def metrics(self) -> TaskMetrics:
