@@ -120,8 +120,7 @@ class DockingEnv(VehicleEnv[WorldCfg, StartCfg, PerceptionCfg]):
         return truth.nose_station_m
 
     def _distance_to_go_m(self, truth: Truth) -> float:
-        funnel, latch = self.cfg.station.funnel, self.cfg.station.latch
-        goal = np.array([-(funnel.length_m + latch.depth_m), 0.0, 0.0])
+        goal = np.array([-self.cfg.station.inside_m, 0.0, 0.0])
         return float(np.linalg.norm(truth.nose_station_m - goal))
 
     def _pose_spaces(self) -> dict[str, spaces.Space[Any]]:

@@ -108,6 +108,11 @@ class ConicalStationCfg:
         check_above("array_power_w", self.array_power_w, 0.0, "a power above 0 W")
 
     @property
+    def inside_m(self) -> float:
+        """How far the nose is inside the mouth where the latch can close."""
+        return self.funnel.length_m + self.latch.depth_m
+
+    @property
     def layout(self) -> BeaconLayout:
         """All lights, the array first."""
         return conical_layout(self)

@@ -34,7 +34,7 @@ class ConicalTask:
             ConfigError: a name that does not exist or a value that does not fit.
         """
         self.station = cfg.world.station
-        self.name = "conical station" if self.station.rotating is None else "rotating beacon"
+        self.kind = "conical" if self.station.rotating is None else "rotating"
         self.detector = cfg.perception.detector
         with located("control."):
             find_pilot(cfg.control.controller)  # before the world, whose loops may have to be compiled

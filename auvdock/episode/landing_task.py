@@ -29,7 +29,7 @@ _STAGES = {
 class LandingTask:
     """Implements `auvdock.episode.task.Task` for `LandingEpisodeCfg`."""
 
-    name = "landing station"
+    kind = "landing"
 
     def __init__(self, cfg: LandingEpisodeCfg) -> None:
         """Build world, perception and pilot.

@@ -13,7 +13,8 @@ import numpy as np
 from auvdock.core.strict import to_plain
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.episode.result import EpisodeResult
-from auvdock.episode.task import TaskMetrics, make_task
+from auvdock.episode.stations import STATIONS, make_task
+from auvdock.episode.task import TaskMetrics
 from auvdock.episode.trace import EpisodeObserver, EpisodeSetup, Tick
 from auvdock.sim.mj import mujoco
 
@@ -102,7 +103,8 @@ class EpisodeRunner:
     def _setup(self, seed: int) -> EpisodeSetup:
         world = self.world
         return EpisodeSetup(
-            title=f"{self.task.name}, seed {seed}, {self.cfg.world.fidelity}",
+            title=f"{STATIONS[self.task.kind].name}, seed {seed}, {self.cfg.world.fidelity}",
+            kind=self.task.kind,
             station=self.task.station,
             vehicle=world.simulator.vehicle,
             camera=world.camera,

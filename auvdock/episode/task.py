@@ -1,4 +1,4 @@
-"""What an episode is made of, and which task a configuration asks for."""
+"""What an episode is made of."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from typing import Any, Protocol
 from auvdock.controllers.pilot import Pilot
 from auvdock.core.stations import StationCfg
 from auvdock.envs.vehicle_world import VehicleWorld
-from auvdock.episode.config import AnyEpisodeCfg, LandingEpisodeCfg
-from auvdock.episode.conical_task import ConicalTask
-from auvdock.episode.landing_task import LandingTask
 from auvdock.episode.trace import Tick
 from auvdock.perception.perceiver import Perceiver
 from auvdock.sim.truth import Truth
 
-__all__ = ["Task", "TaskMetrics", "make_task"]
+__all__ = ["Task", "TaskMetrics"]
 
 
 class TaskMetrics(Protocol):
@@ -34,8 +31,8 @@ class Task(Protocol):
     """One kind of docking: a world, what perceives it, who flies in it, and how it is judged."""
 
     @property
-    def name(self) -> str:
-        """The kind of station, for titles."""
+    def kind(self) -> str:
+        """The kind of station, one of `auvdock.episode.stations.STATIONS`."""
         ...
 
     @property
@@ -70,14 +67,3 @@ class Task(Protocol):
     def stage(self, mode: str) -> str:
         """The failure reason (`FAILURE_REASONS`) of an episode that ends in a guidance mode."""
         ...
-
-
-def make_task(cfg: AnyEpisodeCfg) -> Task:
-    """The task that a configuration asks for.
-
-    Raises:
-        ConfigError: a name that does not exist or a value that does not fit.
-    """
-    if isinstance(cfg, LandingEpisodeCfg):
-        return LandingTask(cfg)
-    return ConicalTask(cfg)
