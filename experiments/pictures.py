@@ -69,7 +69,8 @@ class Album:
         """Write all pairs side by side, each picture at a size of (width, height) px."""
         columns: list[Image] = []
         for pair in self.pairs:
-            columns.append(np.vstack([cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in pair]))
+            small = [np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8) for image in pair]
+            columns.append(np.vstack(small))
         cv2.imwrite(str(out), np.hstack(columns)[:, :, ::-1])
 
 

@@ -112,7 +112,7 @@ def test_the_walk_sees_views_that_were_separated() -> None:
     assert sharing(walk(torn)) == set()
 
 
-def near_env(kind: str, observation: str) -> VehicleEnv:
+def near_env(kind: str, observation: str) -> VehicleEnv[Any, Any, Any]:
     fidelity = "pixels" if observation == "image" else "beacons"
     if kind == "landing":
         start = LandingStartCfg(max_height_m=4.0)
