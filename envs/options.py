@@ -10,18 +10,18 @@ from typing import Any, TypeVar
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import merge
 from auvdock.envs.reward import RewardCfg
-from auvdock.envs.vehicle_world import WorldSettings
+from auvdock.envs.vehicle_world import AnyWorldCfg
 
 __all__ = ["OBSERVATIONS", "check_options", "reward_settings", "world_settings"]
 
 OBSERVATIONS = ("state", "pose", "image")
 
-W = TypeVar("W", bound=WorldSettings)
+W = TypeVar("W", bound=AnyWorldCfg)
 T = TypeVar("T")
 
 
 def world_settings(
-    default: W, cfg: W | None, observation: str, fidelity: str | None, start: object, time_limit_s: float | None
+    default: W, cfg: object, observation: str, fidelity: str | None, start: object, time_limit_s: float | None
 ) -> W:
     """The world that an environment's arguments ask for.
 
@@ -37,17 +37,19 @@ def world_settings(
         ConfigError: an argument that cannot be used, by its name.
     """
     if cfg is None:
-        cfg = dataclasses.replace(default, fidelity="pixels" if observation == "image" else "beacons")
-    elif not isinstance(cfg, type(default)):
+        world = dataclasses.replace(default, fidelity="pixels" if observation == "image" else "beacons")
+    elif isinstance(cfg, type(default)):
+        world = cfg
+    else:
         raise ConfigError("cfg", type(cfg).__name__, f"a {type(default).__name__}")
     if fidelity is not None:
-        cfg = dataclasses.replace(cfg, fidelity=fidelity)
+        world = dataclasses.replace(world, fidelity=fidelity)
     if start is not None:
-        cfg = dataclasses.replace(cfg, start=_changed("start", cfg.start, start))
+        world = dataclasses.replace(world, start=_changed("start", world.start, start))
     if time_limit_s is not None:
-        limits = dataclasses.replace(cfg.limits, max_time_s=_seconds(time_limit_s))
-        cfg = dataclasses.replace(cfg, limits=limits)
-    return cfg
+        limits = dataclasses.replace(world.limits, max_time_s=_seconds(time_limit_s))
+        world = dataclasses.replace(world, limits=limits)
+    return world
 
 
 def reward_settings(reward: RewardCfg | Mapping[str, Any] | None) -> RewardCfg:

@@ -19,7 +19,7 @@ from auvdock.envs.actions import checked_action
 from auvdock.envs.chase import ChaseCamera, View, from_behind
 from auvdock.envs.options import check_options, reward_settings, world_settings
 from auvdock.envs.reward import RewardCfg
-from auvdock.envs.vehicle_world import VehicleWorld, WorldSettings
+from auvdock.envs.vehicle_world import AnyWorldCfg, VehicleWorld
 from auvdock.perception.perceiver import Perceiver
 from auvdock.sim.simulator import Simulator
 from auvdock.sim.truth import Truth
@@ -31,7 +31,7 @@ BOUND = 20_000.0
 
 Observation = Array | dict[str, Any]
 
-W = TypeVar("W", bound=WorldSettings)
+W = TypeVar("W", bound=AnyWorldCfg)
 S = TypeVar("S")
 P = TypeVar("P")
 

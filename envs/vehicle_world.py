@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import Field, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,15 +20,16 @@ from auvdock.core.marine import flip_vector
 from auvdock.core.stations import StationCfg
 from auvdock.core.strict import load_toml
 from auvdock.core.vehicle import MountCfg, VehicleCfg, load_vehicle
-from auvdock.envs.config import LimitsCfg
+from auvdock.envs.config import WorldCfg
+from auvdock.envs.landing_config import LandingWorldCfg
 from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
 from auvdock.optics.imaging import UnderwaterCamera
-from auvdock.optics.water import WaterCfg, load_water, with_attenuation
+from auvdock.optics.water import load_water, with_attenuation
 from auvdock.sim.ocean import CurrentCfg
-from auvdock.sim.simulator import SimCfg, Simulator
+from auvdock.sim.simulator import Simulator
 from auvdock.sim.truth import Truth
 
-__all__ = ["Start", "VehicleWorld", "WorldSettings", "detection_model", "mounted_camera"]
+__all__ = ["AnyWorldCfg", "Start", "VehicleWorld", "detection_model", "mounted_camera"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,45 +49,8 @@ class Start:
     compass_datum_rad: float = 0.0
 
 
-class WorldSettings(Protocol):
-    """What the configurations of all worlds, dataclasses, have in common."""
-
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
-
-    @property
-    def fidelity(self) -> str:
-        """One of `auvdock.envs.config.FIDELITIES`."""
-        ...
-
-    @property
-    def water(self) -> str | WaterCfg:
-        """Water preset, file, or water."""
-        ...
-
-    @property
-    def attenuation_per_m(self) -> float | None:
-        """Beam attenuation in place of the preset's."""
-        ...
-
-    @property
-    def sim(self) -> SimCfg:
-        """Vehicle, current, sensors, physics rate."""
-        ...
-
-    @property
-    def start(self) -> Any:  # noqa: ANN401 - each kind of station has starts of its own
-        """Where an episode starts."""
-        ...
-
-    @property
-    def limits(self) -> LimitsCfg:
-        """What ends an episode without success."""
-        ...
-
-    @property
-    def control_hz(self) -> float:
-        """Commands a second."""
-        ...
+AnyWorldCfg: TypeAlias = WorldCfg | LandingWorldCfg
+"""Configuration of any world."""
 
 
 class VehicleWorld(ABC):
@@ -102,7 +66,7 @@ class VehicleWorld(ABC):
         water: the water.
     """
 
-    def __init__(self, cfg: WorldSettings, station: StationCfg, make_camera: Callable[[VehicleCfg], Camera]) -> None:
+    def __init__(self, cfg: AnyWorldCfg, station: StationCfg, make_camera: Callable[[VehicleCfg], Camera]) -> None:
         """Build simulator, camera and water.
 
         Args:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
 from typing import cast
 
 from auvdock.controllers.landing.pilot import LandingPilot
-from auvdock.controllers.named import PilotFactory, find_pilot, make_named_pilot
-from auvdock.core.errors import located
+from auvdock.controllers.named import PilotFactory
+from auvdock.core.arrays import Array
+from auvdock.core.camera import Camera
+from auvdock.core.vehicle import VehicleCfg
 from auvdock.envs.perceived import perceived_landing
 from auvdock.episode.config import LandingEpisodeCfg
 from auvdock.episode.landing_metrics import LandingMetrics
-from auvdock.episode.result import stage_of
+from auvdock.episode.task import Task, make_pilot
 
-__all__ = ["LandingTask"]
+__all__ = ["landing_task"]
 
-_STAGES = {
+_STAGES: Mapping[str, str] = {
     "search": "search",
     "approach": "far",
     "align": "mid",
@@ -23,37 +27,27 @@ _STAGES = {
     "docked": "terminal",
     "abort": "timeout",
 }
-"""Failure reasons by guidance mode."""
 
 
-class LandingTask:
-    """Implements `auvdock.episode.task.Task` for `LandingEpisodeCfg`."""
+def landing_task(cfg: LandingEpisodeCfg) -> Task:
+    """The task.
 
-    kind = "landing"
+    Raises:
+        ConfigError: a name that does not exist or a value that does not fit.
+    """
+    world, perceiver = perceived_landing(cfg.world, cfg.perception)
+    own = cast(PilotFactory, LandingPilot)  # it reads more of a percept than others do, and is given no other
+    return Task(
+        kind="landing",
+        station=cfg.world.station,
+        detector=cfg.perception.detector,
+        world=world,
+        perceiver=perceiver,
+        pilot=make_pilot(cfg, world, own),
+        metrics=partial(_metrics, world.camera, world.simulator.vehicle, world.simulator.T_world_station),
+        stages=_STAGES,
+    )
 
-    def __init__(self, cfg: LandingEpisodeCfg) -> None:
-        """Build world, perception and pilot.
 
-        Raises:
-            ConfigError: a name that does not exist or a value that does not fit.
-        """
-        self.station = cfg.world.station
-        self.detector = cfg.perception.detector
-        with located("control."):
-            find_pilot(cfg.control.controller)  # before the world, whose loops may have to be compiled
-        self.world, self.perceiver = perceived_landing(cfg.world, cfg.perception)
-        vehicle, camera = self.world.simulator.vehicle, self.world.camera
-        own = cast(PilotFactory, LandingPilot)  # it reads more of a percept than others do; it is given no other
-        dt_s = 1.0 / cfg.world.control_hz
-        control = cfg.control
-        with located("control."):
-            self.pilot = make_named_pilot(control.controller, own, control, vehicle, self.station, camera, dt_s)
-
-    def metrics(self) -> LandingMetrics:
-        """Metrics of a new episode."""
-        simulator = self.world.simulator
-        return LandingMetrics(self.world.camera, simulator.vehicle, simulator.T_world_station)
-
-    def stage(self, mode: str) -> str:
-        """The failure reason of an episode that ends in a guidance mode."""
-        return stage_of(mode, _STAGES)
+def _metrics(camera: Camera, vehicle: VehicleCfg, T_world_station: Array) -> list[LandingMetrics]:
+    return [LandingMetrics(camera, vehicle, T_world_station)]

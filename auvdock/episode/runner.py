@@ -12,9 +12,9 @@ import numpy as np
 
 from auvdock.core.strict import to_plain
 from auvdock.episode.config import AnyEpisodeCfg
-from auvdock.episode.result import EpisodeResult
+from auvdock.episode.result import EpisodeResult, stage_of
 from auvdock.episode.stations import STATIONS, make_task
-from auvdock.episode.task import TaskMetrics
+from auvdock.episode.task import Metrics
 from auvdock.episode.trace import EpisodeObserver, EpisodeSetup, Tick
 from auvdock.sim.mj import mujoco
 
@@ -65,7 +65,8 @@ class EpisodeRunner:
                 observer.on_start(setup)
             try:
                 for tick in self._ticks(seed, flight):
-                    metrics.add(tick)
+                    for each in metrics:
+                        each.add(tick)
                     for observer in observers:
                         observer.on_tick(tick)
             except KeyboardInterrupt:
@@ -90,14 +91,14 @@ class EpisodeRunner:
             image = sensed.frame.image if sensed.frame is not None else None
             yield Tick(world.truth, sensed.proprioception, image, percept, command)
             if command.giving_up:
-                flight.failure_reason = self.task.stage(flight.stage)
+                flight.failure_reason = stage_of(flight.stage, self.task.stages)
                 return
             world.step(command.values)
             if world.is_success:
                 return
             end = world.end
             if end is not None:
-                flight.failure_reason = self.task.stage(flight.mode) if end == "timeout" else end
+                flight.failure_reason = stage_of(flight.mode, self.task.stages) if end == "timeout" else end
                 return
 
     def _setup(self, seed: int) -> EpisodeSetup:
@@ -119,9 +120,10 @@ class EpisodeRunner:
             observer.on_end(result)
         return result
 
-    def _result(self, seed: int, metrics: TaskMetrics, flight: _Flight, started: float) -> EpisodeResult:
+    def _result(self, seed: int, metrics: Sequence[Metrics], flight: _Flight, started: float) -> EpisodeResult:
         truth = self.world.truth
         wall_s = time.perf_counter() - started
+        measured = {name: value for each in metrics for name, value in each.fields(truth).items()}
         return EpisodeResult(
             success=self.world.is_success and flight.failure_reason is None,
             failure_reason=flight.failure_reason,
@@ -135,7 +137,7 @@ class EpisodeRunner:
             real_time_factor=truth.time_s / wall_s if wall_s > 0.0 else 0.0,
             versions=self._versions,
             config=self._plain_config,
-            **metrics.fields(truth),
+            **measured,
         )
 
 

@@ -8,12 +8,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from auvdock.controllers.named import find_pilot
+from auvdock.core.errors import located
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.strict import read_toml
 from auvdock.episode.config import AnyEpisodeCfg, EpisodeCfg, LandingEpisodeCfg, landing_level_cfg, level_cfg
-from auvdock.episode.conical_task import ConicalTask
-from auvdock.episode.landing_task import LandingTask
+from auvdock.episode.conical_task import conical_task
+from auvdock.episode.landing_task import landing_task
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.result_lines import Line, docking_lines, landing_lines, shared_lines
 from auvdock.episode.task import Task
@@ -63,7 +65,10 @@ STATIONS: Mapping[str, StationKind] = {
 }
 """All of them, by the names that users know them by. `auvdock.recording.parts` has what each adds to a recording."""
 
-_TASKS: Mapping[type[AnyEpisodeCfg], Callable[[Any], Task]] = {EpisodeCfg: ConicalTask, LandingEpisodeCfg: LandingTask}
+_TASKS: Mapping[type, Callable[[Any], Task]] = {
+    EpisodeCfg: conical_task,
+    LandingEpisodeCfg: landing_task,
+}
 
 
 def make_task(cfg: AnyEpisodeCfg) -> Task:
@@ -72,6 +77,8 @@ def make_task(cfg: AnyEpisodeCfg) -> Task:
     Raises:
         ConfigError: a name that does not exist or a value that does not fit.
     """
+    with located("control."):
+        find_pilot(cfg.control.controller)  # before the world, whose loops may have to be compiled
     return _TASKS[type(cfg)](cfg)
 
 

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
-from auvdock.core.arrays import Array
 from auvdock.core.station import ConicalStationCfg
 from auvdock.recording import paths
-from auvdock.recording.batch import Batch
 from auvdock.recording.meshes import frustum
 from auvdock.recording.modes import from_the_mouth
 from auvdock.recording.palette import rgba
-from auvdock.recording.part import Point, Series, StationPart
+from auvdock.recording.part import Point, StationPart
 
 if TYPE_CHECKING:
-    from auvdock.episode.trace import EpisodeSetup, Tick
+    from auvdock.episode.trace import EpisodeSetup
 
 __all__ = ["ConicalPart"]
 
@@ -30,8 +26,6 @@ class ConicalPart(StationPart):
     """A funnel and the tube behind it; all else is what every kind of station has."""
 
     grid_m = 5.0
-    plots: Mapping[str, Series] = {}
-    modes: Mapping[str, int] = {}
 
     def __init__(self, setup: EpisodeSetup, station: ConicalStationCfg) -> None:
         """Begin an episode."""
@@ -51,17 +45,6 @@ class ConicalPart(StationPart):
         for path, mesh in ((paths.FUNNEL, cone), (paths.TUBE, tube)):
             stream.log(path, mesh.shown(rgba(200, 205, 210, 110)), static=True, strict=True)
 
-    def views(self) -> list[rrb.Vertical]:
-        """None of its own."""
-        return []
-
-    def lanes(self) -> list[rrb.StateTimelineView]:
-        """None of its own."""
-        return []
-
     def place(self, to_go_m: float) -> str:
         """The nose's way to the mouth."""
         return from_the_mouth(to_go_m)
-
-    def write(self, batch: Batch, ticks: Sequence[Tick], T_station_camera: Array) -> None:
-        """Nothing of its own."""

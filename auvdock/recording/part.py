@@ -32,8 +32,8 @@ class StationPart(ABC):
     """
 
     grid_m: float
-    plots: Mapping[str, Series]
-    modes: Mapping[str, int]
+    plots: Mapping[str, Series] = {}
+    modes: Mapping[str, int] = {}
 
     @abstractmethod
     def eye(self, station_m: Point) -> tuple[Point, Point]:
@@ -44,20 +44,19 @@ class StationPart(ABC):
         """Log what stays the same: the station's body, in the station frame, and how its own marks look."""
 
     @abstractmethod
-    def views(self) -> list[rrb.Vertical]:
-        """Tabs of plots, the foremost first."""
-
-    @abstractmethod
-    def lanes(self) -> list[rrb.StateTimelineView]:
-        """States shown below the pilot's modes."""
-
-    @abstractmethod
     def place(self, to_go_m: float) -> str:
         """Where the vehicle is, in words for the log of modes, by `Truth.to_go_m`."""
 
-    @abstractmethod
-    def write(self, batch: Batch, ticks: Sequence[Tick], T_station_camera: Array) -> None:
-        """Write ticks (at least one) in their order.
+    def views(self) -> list[rrb.Vertical]:
+        """Tabs of plots that other kinds do not have, the foremost first."""
+        return []
+
+    def lanes(self) -> list[rrb.StateTimelineView]:
+        """States shown below the pilot's modes."""
+        return []
+
+    def write(self, batch: Batch, ticks: Sequence[Tick], T_station_camera: Array) -> None:  # noqa: B027 - often none
+        """Write its own columns of ticks (at least one) in their order.
 
         Args:
             batch: their times.
