@@ -17,6 +17,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
 
 from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotSetpoint
@@ -44,7 +45,7 @@ def _reach(vehicle: VehicleCfg) -> Array:
     return np.abs(vehicle.thruster_wrenches_body[:, thrusters]).sum(axis=1)
 
 
-class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
+class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any], RecordConstructorArgs):
     """Actions are body wrenches τ = (X, Y, Z, M, N) in shares of the thrusters' reach; see the module's table.
 
     Positive is ahead, to port, up, nose down and to port (body axes x forward, y port, z up).
@@ -52,7 +53,8 @@ class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         """Wrap a docking environment."""
-        super().__init__(env)
+        RecordConstructorArgs.__init__(self)
+        gymnasium.ActionWrapper.__init__(self, env)
         inner = _docking(env)
         self._allocator = ThrustAllocator(inner.world.simulator.vehicle, inner.allocation_cfg)
         self._reach = _reach(inner.world.simulator.vehicle)
@@ -71,7 +73,7 @@ class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
         return self._allocator.allocate(wrench * self._reach, surge_m_s).astype(np.float32)
 
 
-class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any]):
+class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any], RecordConstructorArgs):
     """Actions are set-points of the vehicle's autopilot, level and over ground; see the module's table.
 
     The heading set-point is the heading now plus the action's change.
@@ -87,7 +89,8 @@ class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any]):
             env: the environment.
             cfg: the autopilot; by default the station's own pilot's.
         """
-        super().__init__(env)
+        RecordConstructorArgs.__init__(self, cfg=cfg)
+        gymnasium.ActionWrapper.__init__(self, env)
         inner = _docking(env)
         self._autopilot = Autopilot(inner.world.simulator.vehicle, cfg or inner.autopilot_cfg, inner.control_s)
         self._allocator = ThrustAllocator(inner.world.simulator.vehicle, inner.allocation_cfg)
