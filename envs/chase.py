@@ -3,25 +3,55 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from auvdock.core.arrays import Image
-from auvdock.core.landing_station import LandingStationCfg
+from auvdock.core.arrays import Array, Image
 from auvdock.optics.offscreen import Offscreen
 from auvdock.sim.mj import mujoco
 from auvdock.sim.simulator import Simulator
 
-__all__ = ["ChaseCamera"]
+__all__ = ["ChaseCamera", "View", "from_behind", "from_the_side"]
+
+
+class View(NamedTuple):
+    """Where the chase camera stands: it looks at a point of the world from a distance, by azimuth and elevation."""
+
+    look_at_m: Array
+    azimuth_deg: float
+    elevation_deg: float
+    distance_m: float
+
+
+def from_behind(simulator: Simulator) -> View:
+    """The vehicle and what lies before it, from behind and above."""
+    T_world_body = simulator.truth.T_world_body
+    forward = T_world_body[:3, 0]
+    azimuth_deg = math.degrees(math.atan2(forward[1], forward[0])) + 25.0
+    return View(T_world_body[:3, 3] + 1.2 * forward, azimuth_deg, -18.0, 4.5)
+
+
+def from_the_side(simulator: Simulator) -> View:
+    """From so far back that the vehicle and the platform below it are both in view."""
+    platform_m = simulator.T_world_station[:3, 3]
+    down = simulator.truth.T_world_body[:3, 3] - platform_m
+    return View(platform_m + 0.5 * down, 60.0, -14.0, 2.2 + 1.4 * float(np.linalg.norm(down)))
 
 
 class ChaseCamera:
     """Follows the vehicle; makes its OpenGL context at the first picture and leaves it behind when pickled."""
 
-    def __init__(self, simulator: Simulator, width_px: int = 640, height_px: int = 360) -> None:
-        """Remember what to look at."""
-        self._simulator = simulator
+    def __init__(
+        self,
+        simulator: Simulator,
+        view: Callable[[Simulator], View] = from_behind,
+        width_px: int = 640,
+        height_px: int = 360,
+    ) -> None:
+        """Remember what to look at, and from where."""
+        self._simulator, self._view = simulator, view
         self._size = (width_px, height_px)
         self._offscreen: Offscreen | None = None
         self._scene: Any = None
@@ -33,19 +63,8 @@ class ChaseCamera:
             GraphicsError: no OpenGL context can be had, or it is at work in another thread.
         """
         simulator = self._simulator
-        T_world_body = simulator.truth.T_world_body
-        forward = T_world_body[:3, 0]
         camera = mujoco.MjvCamera()
-        camera.lookat[:] = T_world_body[:3, 3] + 1.2 * forward
-        camera.azimuth = math.degrees(math.atan2(forward[1], forward[0])) + 25.0
-        camera.elevation = -18.0
-        camera.distance = 4.5
-        if isinstance(simulator.station, LandingStationCfg):
-            # From the side, so far back that vehicle and platform are both in view.
-            down = T_world_body[:3, 3] - simulator.T_world_station[:3, 3]
-            camera.lookat[:] = simulator.T_world_station[:3, 3] + 0.5 * down
-            camera.azimuth, camera.elevation = 60.0, -14.0
-            camera.distance = 2.2 + 1.4 * float(np.linalg.norm(down))
+        camera.lookat[:], camera.azimuth, camera.elevation, camera.distance = self._view(simulator)
         # The simulator leaves derived poses stale while nobody looks; draw from the state itself.
         mujoco.mj_kinematics(simulator.model, simulator.data)
         category = mujoco.mjtCatBit.mjCAT_ALL
@@ -61,11 +80,11 @@ class ChaseCamera:
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but OpenGL's state, which lives in one process."""
-        return {"simulator": self._simulator, "size": self._size}
+        return {"simulator": self._simulator, "view": self._view, "size": self._size}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A camera without a context."""
-        self.__init__(state["simulator"], *state["size"])
+        self.__init__(state["simulator"], state["view"], *state["size"])
 
     def _drawn_by(self) -> tuple[Offscreen, Any]:
         if self._offscreen is None or not self._offscreen.is_ours:

@@ -82,89 +82,45 @@ time_limit_s=30)`, wrapped in `auvdock.envs.wrappers.SetPointAction`: the defaul
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
 from auvdock.core.arrays import Array
-from auvdock.core.contracts import AzimuthFix, Percept
+from auvdock.core.contracts import AzimuthFix, Percept, Sensed
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
 from auvdock.envs.config import StartCfg, WorldCfg
-from auvdock.envs.options import OBSERVATIONS, check_options, reward_settings, world_settings
-from auvdock.envs.reward import RewardCfg
+from auvdock.envs.perceived import perceived_docking
 from auvdock.envs.vehicle_env import BOUND, VehicleEnv, box
-from auvdock.envs.world import DockingWorld, Sensed
-from auvdock.perception.detectors import make_station_detector
-from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
+from auvdock.perception.pipeline import PerceptionCfg
 from auvdock.sim.truth import Truth
 
-__all__ = ["OBSERVATIONS", "DockingEnv"]
+__all__ = ["DockingEnv"]
 
 
-class DockingEnv(VehicleEnv):
+class DockingEnv(VehicleEnv[WorldCfg, StartCfg, PerceptionCfg]):
     """`auvdock/ConicalDocking-v0`; see the module's docstring for the tables."""
 
     default_cfg = staticmethod(WorldCfg)
-    """Makes the world where no `cfg` is given."""
-
-    def __init__(
-        self,
-        cfg: WorldCfg | None = None,
-        *,
-        observation: str = "state",
-        fidelity: str | None = None,
-        start: StartCfg | Mapping[str, Any] | None = None,
-        reward: RewardCfg | Mapping[str, Any] | None = None,
-        time_limit_s: float | None = None,
-        perception: PerceptionCfg | None = None,
-        render_mode: str | None = None,
-        render_camera: str = "chase",
-    ) -> None:
-        """Build the environment; no renderer is made before an image is asked for.
-
-        Raises:
-            ConfigError: an option that does not exist or does not fit the others.
-        """
-        self.cfg = world_settings(self.default_cfg(), cfg, observation, fidelity, start, time_limit_s)
-        check_options(observation, self.cfg.fidelity, render_mode, render_camera, ("chase", "bow"))
-        perception = perception or PerceptionCfg()
-        self._world = DockingWorld(self.cfg, perception.detector)
-        self._detector = make_station_detector(perception.detector, self.cfg.station)
-        self._perception = BeaconPerception(
-            perception,
-            self._world.camera,
-            self.cfg.station.layout,
-            self.cfg.station.rotating,
-            heading_surveyed=self.cfg.station_heading == "surveyed",
-        )
-        self._percept: Percept | None = None
-        self._fix: AzimuthFix | None = None
-        super().__init__(self._world, observation, self.cfg, reward_settings(reward), render_mode, render_camera)
-
-    @property
-    def world(self) -> DockingWorld:
-        """The world inside, for metrics."""
-        return self._world
+    default_perception = staticmethod(PerceptionCfg)
+    perceived = staticmethod(perceived_docking)
+    _fix: AzimuthFix | None = None
 
     def _forget(self) -> None:
-        self._perception.reset()
-        self._percept = None
+        super()._forget()
         self._fix = None
 
     def _perceive(self, sensed: Sensed) -> None:
-        detections = self._detector.detect(sensed.frame) if sensed.frame is not None else sensed.detections
-        if detections is not None:
-            self._percept = self._perception.update(detections, sensed.proprioception)
+        super()._perceive(sensed)
+        if self._percept is not None:
             self._fix = self._percept.azimuth or self._fix
 
     def _place(self, truth: Truth) -> Array:
         return truth.nose_station_m
 
     def _distance_to_go_m(self, truth: Truth) -> float:
-        funnel, latch = self.cfg.station.funnel, self.cfg.station.latch
-        goal = np.array([-(funnel.length_m + latch.depth_m), 0.0, 0.0])
+        goal = np.array([-self.cfg.station.inside_m, 0.0, 0.0])
         return float(np.linalg.norm(truth.nose_station_m - goal))
 
     def _pose_spaces(self) -> dict[str, spaces.Space[Any]]:

@@ -83,24 +83,20 @@ place of `cfg.limits.max_time_s`), `perception` (`LandingPerceptionCfg`, used by
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
+from auvdock.controllers.landing.config import HoverAllocationCfg, HoverAutopilotCfg
 from auvdock.core.arrays import Array
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
+from auvdock.envs.chase import from_the_side
 from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
-from auvdock.envs.landing_world import LandingWorld
-from auvdock.envs.options import check_options, reward_settings, world_settings
-from auvdock.envs.reward import RewardCfg
+from auvdock.envs.perceived import perceived_landing
 from auvdock.envs.vehicle_env import VehicleEnv, box
-from auvdock.envs.vehicle_world import Sensed
-from auvdock.perception.detectors import make_detector
 from auvdock.perception.landing.config import LandingPerceptionCfg
-from auvdock.perception.landing.pipeline import LandingPercept, LandingPerception
-from auvdock.perception.landing.tag_detectors import make_tag_detector
+from auvdock.perception.landing.pipeline import LandingPercept
 from auvdock.sim.truth import Truth
 
 __all__ = ["LandingEnv"]
@@ -108,54 +104,16 @@ __all__ = ["LandingEnv"]
 _LEVELS = {"none": 0.0, "lights": 1.0, "tag": 2.0, "fused": 3.0}
 
 
-class LandingEnv(VehicleEnv):
+class LandingEnv(VehicleEnv[LandingWorldCfg, LandingStartCfg, LandingPerceptionCfg]):
     """`auvdock/LandingDocking-v0`; see the module's docstring for the tables."""
 
-    def __init__(
-        self,
-        cfg: LandingWorldCfg | None = None,
-        *,
-        observation: str = "state",
-        fidelity: str | None = None,
-        start: LandingStartCfg | Mapping[str, Any] | None = None,
-        reward: RewardCfg | Mapping[str, Any] | None = None,
-        time_limit_s: float | None = None,
-        perception: LandingPerceptionCfg | None = None,
-        render_mode: str | None = None,
-        render_camera: str = "chase",
-    ) -> None:
-        """Build the environment; no renderer is made before an image is asked for.
-
-        Raises:
-            ConfigError: an option that does not exist or does not fit the others.
-        """
-        self.cfg = world_settings(LandingWorldCfg(), cfg, observation, fidelity, start, time_limit_s)
-        check_options(observation, self.cfg.fidelity, render_mode, render_camera, ("chase", "belly"))
-        perception = perception or LandingPerceptionCfg()
-        self._world = LandingWorld(self.cfg, perception.detector, perception.tag_detector)
-        self._detector = make_detector(perception.detector)
-        self._tag_detector = make_tag_detector(perception.tag_detector, (self.cfg.station.tag.tag_id,))
-        self._perception = LandingPerception(perception, self._world.camera, self.cfg.station)
-        self._percept: LandingPercept | None = None
-        self._seat = np.append(self._world.simulator.vehicle.seat_body_m, 1.0)
-        super().__init__(self._world, observation, self.cfg, reward_settings(reward), render_mode, render_camera)
-
-    @property
-    def world(self) -> LandingWorld:
-        """The world inside, for metrics."""
-        return self._world
-
-    def _forget(self) -> None:
-        self._perception.reset()
-        self._percept = None
-
-    def _perceive(self, sensed: Sensed) -> None:
-        own = sensed.proprioception
-        if sensed.frame is not None:
-            tags = self._tag_detector.detect(sensed.frame, self._perception.tag_regions(own))
-            self._percept = self._perception.update(self._detector.detect(sensed.frame), tags, own)
-        elif sensed.detections is not None:
-            self._percept = self._perception.update(sensed.detections, sensed.tags, own)
+    default_cfg = staticmethod(LandingWorldCfg)
+    default_perception = staticmethod(LandingPerceptionCfg)
+    perceived = staticmethod(perceived_landing)
+    own_camera = "belly"
+    chase_view = staticmethod(from_the_side)
+    allocation_cfg = HoverAllocationCfg()
+    autopilot_cfg = HoverAutopilotCfg()
 
     def _place(self, truth: Truth) -> Array:
         return truth.landing.seat_error_m if truth.landing is not None else np.zeros(3)
@@ -174,12 +132,12 @@ class LandingEnv(VehicleEnv):
 
     def _pose_vectors(self) -> dict[str, Array]:
         pose, valid, level, ray = np.zeros(6), np.zeros(1), np.zeros(1), np.zeros(4)
-        percept = self._percept
+        percept: LandingPercept | None = self._percept
         if percept is not None:
             level[0] = _LEVELS[percept.level]
             if percept.pose is not None:
                 T_station_body = percept.pose.T_station_camera @ invert(self._world.camera.T_body_camera)
-                pose[:3] = (T_station_body @ self._seat)[:3]
+                pose[:3] = (T_station_body @ np.append(self._world.simulator.vehicle.seat_body_m, 1.0))[:3]
                 pose[2] -= self.cfg.station.guide.seat_height_m
                 pose[3:] = euler_zyx_from_rotation(T_station_body[:3, :3])
                 valid[0] = 1.0 if percept.pose.measured else 0.5

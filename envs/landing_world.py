@@ -11,7 +11,7 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.calibrated_camera import CalibratedCameraCfg, make_calibrated_camera
 from auvdock.core.camera import Camera
-from auvdock.core.contracts import Proprioception
+from auvdock.core.contracts import Proprioception, Sensed
 from auvdock.core.errors import located
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.marine import flip_vector
@@ -19,7 +19,7 @@ from auvdock.core.strict import load_toml
 from auvdock.core.transforms import quat_wxyz_from_euler_zyx
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
-from auvdock.envs.vehicle_world import Sensed, Start, VehicleWorld
+from auvdock.envs.vehicle_world import Start, VehicleWorld
 from auvdock.optics.detection_model import DetectionModelCfg
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.landing_camera import LandingCamera
@@ -96,8 +96,8 @@ class LandingWorld(VehicleWorld):
     def _look(self, truth: Truth, proprioception: Proprioception) -> Sensed:
         if self._sensor is not None:
             detections, tags = self._sensor.detect(truth.T_world_body, truth.time_s)
-            return Sensed(proprioception, None, detections, tags)
-        return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s), None)
+            return Sensed(proprioception, detections=detections, tags=tags)
+        return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s))
 
     def _rendered_camera(self) -> UnderwaterCamera:
         return self.imager

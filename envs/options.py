@@ -9,26 +9,20 @@ from typing import Any, TypeVar
 
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import merge
-from auvdock.envs.config import StartCfg, WorldCfg
-from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.reward import RewardCfg
+from auvdock.envs.vehicle_world import AnyWorldCfg
 
 __all__ = ["OBSERVATIONS", "check_options", "reward_settings", "world_settings"]
 
 OBSERVATIONS = ("state", "pose", "image")
 
-C = TypeVar("C", WorldCfg, LandingWorldCfg)
-T = TypeVar("T", StartCfg, LandingStartCfg, RewardCfg)
+W = TypeVar("W", bound=AnyWorldCfg)
+T = TypeVar("T")
 
 
 def world_settings(
-    default: C,
-    cfg: WorldCfg | LandingWorldCfg | None,
-    observation: str,
-    fidelity: str | None,
-    start: StartCfg | LandingStartCfg | Mapping[str, Any] | None,
-    time_limit_s: float | None,
-) -> C:
+    default: W, cfg: object, observation: str, fidelity: str | None, start: object, time_limit_s: float | None
+) -> W:
     """The world that an environment's arguments ask for.
 
     Args:
@@ -36,24 +30,26 @@ def world_settings(
         cfg: the world, of the default's kind.
         observation: one of `OBSERVATIONS`.
         fidelity: in place of the `cfg`'s; without either, "pixels" for images and "beacons" for the rest.
-        start: in place of the `cfg`'s; a mapping changes only the fields that it names.
+        start: of the kind of the `cfg`'s and in its place, or a mapping that changes only the fields that it names.
         time_limit_s: in place of `cfg.limits.max_time_s`.
 
     Raises:
         ConfigError: an argument that cannot be used, by its name.
     """
     if cfg is None:
-        cfg = dataclasses.replace(default, fidelity="pixels" if observation == "image" else "beacons")
-    elif not isinstance(cfg, type(default)):
+        world = dataclasses.replace(default, fidelity="pixels" if observation == "image" else "beacons")
+    elif isinstance(cfg, type(default)):
+        world = cfg
+    else:
         raise ConfigError("cfg", type(cfg).__name__, f"a {type(default).__name__}")
     if fidelity is not None:
-        cfg = dataclasses.replace(cfg, fidelity=fidelity)
+        world = dataclasses.replace(world, fidelity=fidelity)
     if start is not None:
-        cfg = dataclasses.replace(cfg, start=_changed("start", cfg.start, start))
+        world = dataclasses.replace(world, start=_changed("start", world.start, start))
     if time_limit_s is not None:
-        limits = dataclasses.replace(cfg.limits, max_time_s=_seconds(time_limit_s))
-        cfg = dataclasses.replace(cfg, limits=limits)
-    return cfg
+        limits = dataclasses.replace(world.limits, max_time_s=_seconds(time_limit_s))
+        world = dataclasses.replace(world, limits=limits)
+    return world
 
 
 def reward_settings(reward: RewardCfg | Mapping[str, Any] | None) -> RewardCfg:

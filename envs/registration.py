@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import gymnasium
 
-__all__ = ["register_envs"]
+__all__ = ["ENVIRONMENTS", "register_envs"]
+
+ENVIRONMENTS = {
+    "auvdock/ConicalDocking-v0": "auvdock.envs.docking:DockingEnv",
+    "auvdock/RotatingBeaconDocking-v0": "auvdock.envs.rotating_docking:RotatingDockingEnv",
+    "auvdock/LandingDocking-v0": "auvdock.envs.landing:LandingEnv",
+}
+"""Names of all environments and where each lives."""
 
 
 def register_envs() -> None:
-    """Register `auvdock/ConicalDocking-v0`, `auvdock/RotatingBeaconDocking-v0` and `auvdock/LandingDocking-v0`.
-
-    Doing it twice changes nothing.
+    """Register all environments; doing it twice changes nothing.
 
     Time limits are the environment's own (`WorldCfg.limits.max_time_s`), so no `max_episode_steps` is set.
     """
-    if "auvdock/ConicalDocking-v0" not in gymnasium.registry:
-        gymnasium.register(id="auvdock/ConicalDocking-v0", entry_point="auvdock.envs.docking:DockingEnv")
-    if "auvdock/RotatingBeaconDocking-v0" not in gymnasium.registry:
-        gymnasium.register(
-            id="auvdock/RotatingBeaconDocking-v0", entry_point="auvdock.envs.rotating_docking:RotatingDockingEnv"
-        )
-    if "auvdock/LandingDocking-v0" not in gymnasium.registry:
-        gymnasium.register(id="auvdock/LandingDocking-v0", entry_point="auvdock.envs.landing:LandingEnv")
+    for name, entry_point in ENVIRONMENTS.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(id=name, entry_point=entry_point)

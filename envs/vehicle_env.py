@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Generic, TypeVar
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
+from auvdock.controllers.allocation import AllocationCfg
+from auvdock.controllers.autopilot import AutopilotCfg
 from auvdock.core.arrays import Array, Image
-from auvdock.core.contracts import Proprioception
+from auvdock.core.contracts import Proprioception, Sensed
 from auvdock.envs.actions import checked_action
-from auvdock.envs.chase import ChaseCamera
-from auvdock.envs.config import WorldCfg
-from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.envs.chase import ChaseCamera, View, from_behind
+from auvdock.envs.options import check_options, reward_settings, world_settings
 from auvdock.envs.reward import RewardCfg
-from auvdock.envs.vehicle_world import Sensed, VehicleWorld
+from auvdock.envs.vehicle_world import AnyWorldCfg, VehicleWorld
+from auvdock.perception.perceiver import Perceiver
+from auvdock.sim.simulator import Simulator
 from auvdock.sim.truth import Truth
 
 __all__ = ["BOUND", "Observation", "VehicleEnv", "box", "proprioception_vector"]
@@ -27,14 +31,26 @@ BOUND = 20_000.0
 
 Observation = Array | dict[str, Any]
 
+W = TypeVar("W", bound=AnyWorldCfg)
+S = TypeVar("S")
+P = TypeVar("P")
 
-class VehicleEnv(gymnasium.Env[Any, Any], ABC):
+
+class VehicleEnv(gymnasium.Env[Any, Any], ABC, Generic[W, S, P]):
     """A `VehicleWorld` as a Gymnasium environment; a kind of docking says what is observed and how far it is to go.
 
     A copy, by `copy.deepcopy` or pickle, goes on in mid-episode as the original does, bit for bit. OpenGL contexts are
     not copied: a copy makes its own at its first picture.
 
     Attributes:
+        default_cfg: makes the world's settings (type W) where no `cfg` is given; their `start` is of the type S.
+        default_perception: makes perception's settings (type P) where none are given.
+        perceived: makes the world and what perceives it.
+        own_camera: `render_camera` of the pilot's camera.
+        chase_view: where the chase camera stands.
+        allocation_cfg: how the action wrappers share a wrench among the actuators, as the station's own pilot does.
+        autopilot_cfg: the autopilot that `SetPointAction` steers by.
+        cfg: the world's settings.
         observation: one of `auvdock.envs.options.OBSERVATIONS`.
         reward_cfg: what a step pays.
         control_s: length of a step in s.
@@ -42,50 +58,53 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012 - each has its own
 
+    default_cfg: Callable[[], W]
+    default_perception: Callable[[], P]
+    perceived: Callable[[W, P], tuple[VehicleWorld, Perceiver]]
+    own_camera = "bow"
+    chase_view: Callable[[Simulator], View] = staticmethod(from_behind)
+    allocation_cfg: ClassVar[AllocationCfg] = AllocationCfg()
+    autopilot_cfg: ClassVar[AutopilotCfg] = AutopilotCfg()
+
     def __init__(
         self,
-        world: VehicleWorld,
-        observation: str,
-        cfg: WorldCfg | LandingWorldCfg,
-        reward: RewardCfg,
-        render_mode: str | None,
-        render_camera: str,
+        cfg: W | None = None,
+        *,
+        observation: str = "state",
+        fidelity: str | None = None,
+        start: S | Mapping[str, Any] | None = None,
+        reward: RewardCfg | Mapping[str, Any] | None = None,
+        time_limit_s: float | None = None,
+        perception: P | None = None,
+        render_mode: str | None = None,
+        render_camera: str = "chase",
     ) -> None:
-        """Wrap a world; the options have been checked.
+        """Build the environment; no renderer is made before an image is asked for.
 
-        Args:
-            world: the world.
-            observation: one of `auvdock.envs.options.OBSERVATIONS`.
-            cfg: the world's settings.
-            reward: what a step pays.
-            render_mode: "rgb_array" or None.
-            render_camera: "chase", or anything else for the pilot's camera.
+        Raises:
+            ConfigError: an option that does not exist or does not fit the others.
         """
+        self.cfg = cfg = world_settings(self.default_cfg(), cfg, observation, fidelity, start, time_limit_s)
+        check_options(observation, cfg.fidelity, render_mode, render_camera, ("chase", self.own_camera))
         self.observation = observation
-        self.reward_cfg = reward
+        self.reward_cfg = reward_settings(reward)
         self.render_mode = render_mode
         self.metadata = {**type(self).metadata, "render_fps": round(cfg.control_hz, 3)}
         self.control_s = 1.0 / cfg.control_hz
         self._takes_frames = cfg.fidelity == "pixels" and observation != "state"
         self._halt: str | None = "not begun"
         self._render_camera = render_camera
-        self._vehicle_world = world
-        self._chase = ChaseCamera(world.simulator)
+        self._world, self._perceiver = self.perceived(cfg, perception or self.default_perception())
+        self._chase = ChaseCamera(self._world.simulator, self.chase_view)
         self._sensed: Sensed | None = None
+        self._percept: Any = None
+        """The newest frame's percept, of the kind that the station's perceiver gives; None before the first."""
         self._image: Image | None = None
         self._distance_m = 0.0
         self._energy_j = 0.0
-        self._actuators = len(world.simulator.vehicle.actuators)
+        self._actuators = len(self._world.simulator.vehicle.actuators)
         self.action_space = spaces.Box(-1.0, 1.0, (self._actuators,), np.float32)
         self.observation_space = self._make_observation_space()
-
-    @abstractmethod
-    def _forget(self) -> None:
-        """Reset perception."""
-
-    @abstractmethod
-    def _perceive(self, sensed: Sensed) -> None:
-        """Let perception look at what was sensed."""
 
     @abstractmethod
     def _pose_spaces(self) -> dict[str, spaces.Space[Any]]:
@@ -103,10 +122,19 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
     def _distance_to_go_m(self, truth: Truth) -> float:
         """Distance from where the latch closes."""
 
+    def _forget(self) -> None:
+        """Start an episode without anything perceived."""
+        self._perceiver.reset()
+        self._percept = None
+
+    def _perceive(self, sensed: Sensed) -> None:
+        """Let perception look at what was sensed."""
+        self._percept = self._perceiver.perceive(sensed) or self._percept
+
     @property
     def world(self) -> VehicleWorld:
         """The world inside, for metrics."""
-        return self._vehicle_world
+        return self._world
 
     @property
     def proprioception(self) -> Proprioception:
@@ -124,11 +152,11 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
     ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode; the episode's own seed is drawn from the environment's generator."""
         super().reset(seed=seed)
-        self._vehicle_world.reset(int(self.np_random.integers(2**31)))
+        self._world.reset(int(self.np_random.integers(2**31)))
         self._forget()
         self._image = None
         self._sense()
-        truth = self._vehicle_world.truth
+        truth = self._world.truth
         self._distance_m = self._distance_to_go_m(truth)
         self._energy_j = 0.0
         self._halt = None
@@ -143,7 +171,7 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
         """
         if self._halt is not None:
             raise ResetNeeded(f"the episode has {self._halt}: call env.reset() before the next step")
-        world = self._vehicle_world
+        world = self._world
         world.step(checked_action(action, self._actuators))
         self._sense()
         truth = world.truth
@@ -165,19 +193,19 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
             return self._image
         if self._takes_frames:
             return self._blank()  # no frame has come through yet, and taking one here would change the episode
-        return self._vehicle_world.picture()
+        return self._world.picture()
 
     def close(self) -> None:
         """Release the renderers."""
-        self._vehicle_world.close()
+        self._world.close()
         self._chase.close()
 
     def _sense(self) -> None:
         if self.observation == "state":
             # Nobody looks through the camera, so no frame is made.
-            self._sensed = Sensed(self._vehicle_world.simulator.proprioception(), None, None)
+            self._sensed = Sensed(self._world.simulator.proprioception())
             return
-        self._sensed = sensed = self._vehicle_world.sense()
+        self._sensed = sensed = self._world.sense()
         if sensed.frame is not None:
             self._image = sensed.frame.image
         if self.observation == "pose":
@@ -190,10 +218,10 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
         return float(self.reward_cfg.of(progress_m, work_j, self.control_s, success=success, end=end))
 
     def _info(self, truth: Truth) -> dict[str, Any]:
-        success = self._vehicle_world.is_success
+        success = self._world.is_success
         return {
             "is_success": success,
-            "failure_reason": None if success else self._vehicle_world.end,
+            "failure_reason": None if success else self._world.end,
             "time_s": truth.time_s,
             "peak_contact_force_n": truth.peak_contact_force_n,
             "energy_j": truth.energy_j,
@@ -204,7 +232,7 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
             return box(19)
         if self.observation == "pose":
             return spaces.Dict(self._pose_spaces())
-        camera = self._vehicle_world.camera
+        camera = self._world.camera
         return spaces.Dict(
             {
                 "image": spaces.Box(0, 255, (camera.height_px, camera.width_px, 3), np.uint8),
@@ -222,7 +250,7 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
         return {**self._pose_vectors(), "proprioception": own}
 
     def _state(self, truth: Truth) -> Array:
-        R_station_world = self._vehicle_world.simulator.T_world_station[:3, :3].T
+        R_station_world = self._world.simulator.T_world_station[:3, :3].T
         rotation = R_station_world @ truth.T_world_body[:3, :3]
         state = np.concatenate(
             [
@@ -237,7 +265,7 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC):
         return np.clip(np.nan_to_num(state, nan=BOUND), -BOUND, BOUND)  # a diverged state must stay in its space
 
     def _blank(self) -> Image:
-        camera = self._vehicle_world.camera
+        camera = self._world.camera
         return np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
 
 

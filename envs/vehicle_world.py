@@ -7,45 +7,29 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
 from auvdock.assets import asset_names
 from auvdock.core.arrays import Array, Image
 from auvdock.core.camera import Camera, CameraCfg, make_camera
-from auvdock.core.contracts import Detections, Frame, Proprioception, TagDetection
+from auvdock.core.contracts import Proprioception, Sensed
 from auvdock.core.errors import ConfigError, located
 from auvdock.core.marine import flip_vector
 from auvdock.core.stations import StationCfg
 from auvdock.core.strict import load_toml
 from auvdock.core.vehicle import MountCfg, VehicleCfg, load_vehicle
-from auvdock.envs.config import LimitsCfg
+from auvdock.envs.config import WorldCfg
+from auvdock.envs.landing_config import LandingWorldCfg
 from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
 from auvdock.optics.imaging import UnderwaterCamera
-from auvdock.optics.water import WaterCfg, load_water, with_attenuation
+from auvdock.optics.water import load_water, with_attenuation
 from auvdock.sim.ocean import CurrentCfg
-from auvdock.sim.simulator import SimCfg, Simulator
+from auvdock.sim.simulator import Simulator
 from auvdock.sim.truth import Truth
 
-__all__ = ["Sensed", "Start", "VehicleWorld", "WorldSettings", "detection_model", "mounted_camera"]
-
-
-@dataclass(frozen=True, eq=False)
-class Sensed:
-    """What the vehicle can know at one moment.
-
-    Attributes:
-        proprioception: its own sensors.
-        frame: a new camera frame, None between frames or where `detections` stands in for it.
-        detections: in the `beacons` fidelity, the detections of a new frame, else None.
-        tags: in the `beacons` fidelity of a landing, the tags seen in that frame.
-    """
-
-    proprioception: Proprioception
-    frame: Frame | None
-    detections: Detections | None
-    tags: tuple[TagDetection, ...] = ()
+__all__ = ["AnyWorldCfg", "Start", "VehicleWorld", "detection_model", "mounted_camera"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,38 +49,8 @@ class Start:
     compass_datum_rad: float = 0.0
 
 
-class WorldSettings(Protocol):
-    """What the configurations of all worlds have in common."""
-
-    @property
-    def fidelity(self) -> str:
-        """One of `auvdock.envs.config.FIDELITIES`."""
-        ...
-
-    @property
-    def water(self) -> str | WaterCfg:
-        """Water preset, file, or water."""
-        ...
-
-    @property
-    def attenuation_per_m(self) -> float | None:
-        """Beam attenuation in place of the preset's."""
-        ...
-
-    @property
-    def sim(self) -> SimCfg:
-        """Vehicle, current, sensors, physics rate."""
-        ...
-
-    @property
-    def limits(self) -> LimitsCfg:
-        """What ends an episode without success."""
-        ...
-
-    @property
-    def control_hz(self) -> float:
-        """Commands a second."""
-        ...
+AnyWorldCfg: TypeAlias = WorldCfg | LandingWorldCfg
+"""Configuration of any world."""
 
 
 class VehicleWorld(ABC):
@@ -112,7 +66,7 @@ class VehicleWorld(ABC):
         water: the water.
     """
 
-    def __init__(self, cfg: WorldSettings, station: StationCfg, make_camera: Callable[[VehicleCfg], Camera]) -> None:
+    def __init__(self, cfg: AnyWorldCfg, station: StationCfg, make_camera: Callable[[VehicleCfg], Camera]) -> None:
         """Build simulator, camera and water.
 
         Args:
@@ -217,7 +171,7 @@ class VehicleWorld(ABC):
         """Sample the sensors now; once per control period."""
         proprioception = self.simulator.proprioception()
         if self._step_count - self._last_frame_step < self._steps_per_frame:
-            return Sensed(proprioception, None, None)
+            return Sensed(proprioception)
         self._last_frame_step = self._step_count
         self._start_camera()
         return self._look(self.truth, proprioception)

@@ -10,16 +10,16 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
-from auvdock.core.contracts import Proprioception
+from auvdock.core.contracts import Proprioception, Sensed
 from auvdock.core.transforms import quat_wxyz_from_euler_zyx
 from auvdock.envs.config import StartCfg, WorldCfg
-from auvdock.envs.vehicle_world import Sensed, Start, VehicleWorld, detection_model, mounted_camera
+from auvdock.envs.vehicle_world import Start, VehicleWorld, detection_model, mounted_camera
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.sensing import BeaconSensor
 from auvdock.optics.station_clock import StationClock
 from auvdock.sim.truth import Truth
 
-__all__ = ["DockingWorld", "Sensed", "draw_start"]
+__all__ = ["DockingWorld", "draw_start"]
 
 
 def draw_start(cfg: StartCfg, station_depth_m: float, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -93,12 +93,12 @@ class DockingWorld(VehicleWorld):
 
     def _look(self, truth: Truth, proprioception: Proprioception) -> Sensed:
         if self.cfg.frame_drop_share > 0.0 and self._loss_rng.random() < self.cfg.frame_drop_share:
-            return Sensed(proprioception, None, None)
+            return Sensed(proprioception)
         station_s = self._clock.station_time_s(truth.time_s) if self._clock is not None else None
         if self._beacon_sensor is not None:
             detections = self._beacon_sensor.detect(truth.T_world_body, truth.time_s, station_s)
-            return Sensed(proprioception, None, detections)
-        return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s, station_s), None)
+            return Sensed(proprioception, detections=detections)
+        return Sensed(proprioception, self.imager.capture(truth.T_world_body, truth.time_s, station_s))
 
     def _rendered_camera(self) -> UnderwaterCamera:
         return self.imager

@@ -17,14 +17,13 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
 
-from auvdock.controllers.allocation import AllocationCfg, ThrustAllocator
+from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotSetpoint
-from auvdock.controllers.landing.config import HoverAllocationCfg, HoverAutopilotCfg
 from auvdock.core.arrays import Array
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.envs.actions import checked_action
-from auvdock.envs.landing import LandingEnv
 from auvdock.envs.vehicle_env import VehicleEnv
 
 __all__ = ["BodyWrenchAction", "SetPointAction"]
@@ -33,17 +32,11 @@ _AXES = (0, 1, 2, 4, 5)
 """Surge, sway, heave, pitch, yaw."""
 
 
-def _docking(env: gymnasium.Env[Any, Any]) -> VehicleEnv:
+def _docking(env: gymnasium.Env[Any, Any]) -> VehicleEnv[Any, Any, Any]:
     inner = env.unwrapped
     if not isinstance(inner, VehicleEnv):
         raise TypeError(f"{type(inner).__name__} is no docking environment")
     return inner
-
-
-def _allocator(env: VehicleEnv) -> ThrustAllocator:
-    """Shares a wrench as the station's own pilot does."""
-    cfg = HoverAllocationCfg() if isinstance(env, LandingEnv) else AllocationCfg()
-    return ThrustAllocator(env.world.simulator.vehicle, cfg)
 
 
 def _reach(vehicle: VehicleCfg) -> Array:
@@ -52,7 +45,7 @@ def _reach(vehicle: VehicleCfg) -> Array:
     return np.abs(vehicle.thruster_wrenches_body[:, thrusters]).sum(axis=1)
 
 
-class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
+class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any], RecordConstructorArgs):
     """Actions are body wrenches τ = (X, Y, Z, M, N) in shares of the thrusters' reach; see the module's table.
 
     Positive is ahead, to port, up, nose down and to port (body axes x forward, y port, z up).
@@ -60,9 +53,10 @@ class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         """Wrap a docking environment."""
-        super().__init__(env)
+        RecordConstructorArgs.__init__(self)
+        gymnasium.ActionWrapper.__init__(self, env)
         inner = _docking(env)
-        self._allocator = _allocator(inner)
+        self._allocator = ThrustAllocator(inner.world.simulator.vehicle, inner.allocation_cfg)
         self._reach = _reach(inner.world.simulator.vehicle)
         self.action_space = spaces.Box(-1.0, 1.0, (len(_AXES),), np.float32)
 
@@ -79,7 +73,7 @@ class BodyWrenchAction(gymnasium.ActionWrapper[Any, Any, Any]):
         return self._allocator.allocate(wrench * self._reach, surge_m_s).astype(np.float32)
 
 
-class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any]):
+class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any], RecordConstructorArgs):
     """Actions are set-points of the vehicle's autopilot, level and over ground; see the module's table.
 
     The heading set-point is the heading now plus the action's change.
@@ -95,11 +89,11 @@ class SetPointAction(gymnasium.ActionWrapper[Any, Any, Any]):
             env: the environment.
             cfg: the autopilot; by default the station's own pilot's.
         """
-        super().__init__(env)
+        RecordConstructorArgs.__init__(self, cfg=cfg)
+        gymnasium.ActionWrapper.__init__(self, env)
         inner = _docking(env)
-        own = HoverAutopilotCfg() if isinstance(inner, LandingEnv) else AutopilotCfg()
-        self._autopilot = Autopilot(inner.world.simulator.vehicle, cfg or own, inner.control_s)
-        self._allocator = _allocator(inner)
+        self._autopilot = Autopilot(inner.world.simulator.vehicle, cfg or inner.autopilot_cfg, inner.control_s)
+        self._allocator = ThrustAllocator(inner.world.simulator.vehicle, inner.allocation_cfg)
         self._state = self._autopilot.initial_state()
         self.action_space = spaces.Box(-1.0, 1.0, (4,), np.float32)
 

@@ -17,7 +17,6 @@ import numpy as np
 
 from auvdock.campaign.statistics import Rate, wilson
 from auvdock.core.arrays import Array
-from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.transforms import invert
 from auvdock.episode.config import LandingEpisodeCfg, landing_level_cfg
 from auvdock.episode.landing_metrics import ALIGNED_MODES, estimate_error
@@ -66,9 +65,9 @@ class LandingTrial:
 class LandingWatch:
     """Runs all three perceptions on a flight's frames and keeps their errors; an `EpisodeObserver`."""
 
-    def __init__(self, perception: LandingPerceptionCfg) -> None:
+    def __init__(self, flown: LandingEpisodeCfg) -> None:
         """Keep the settings of the perception that flies; the other two share them but for their levels."""
-        self._cfg = perception
+        self._cfg, self._station = flown.perception, flown.world.station
         self._rows: list[tuple[float, bool, float, Array, Array]] = []
         self._errors: dict[str, list[Array]] = {name: [] for name in LEVELS}
         self._measured: dict[str, list[bool]] = {name: [] for name in LEVELS}
@@ -76,15 +75,12 @@ class LandingWatch:
 
     def on_start(self, setup: EpisodeSetup) -> None:
         """Build the perceptions for the flight's camera and station."""
-        if not isinstance(setup.station, LandingStationCfg):
-            raise TypeError("a watch over landings was given another station")
-        self._station = setup.station
         self._T_station_world = invert(setup.T_world_station)
         self._T_camera_body = invert(setup.camera.T_body_camera)
         self._T_body_camera = setup.camera.T_body_camera
         self._seat = np.append(setup.vehicle.seat_body_m, 1.0)
         self._eyes = {
-            name: LandingPerception(_with_levels(self._cfg, name), setup.camera, setup.station)
+            name: LandingPerception(_with_levels(self._cfg, name), setup.camera, self._station)
             for name in LEVELS
             if name != self._cfg.levels
         }
@@ -191,7 +187,7 @@ def fly_trials(
         flown = cfg.override({"perception": {"levels": name}})
         runner = EpisodeRunner(flown)
         for seed in seeds:
-            watch = LandingWatch(flown.perception)
+            watch = LandingWatch(flown)
             runner.run(seed, [watch])
             trials.append(watch.trial(seed, name))
             if advance is not None:

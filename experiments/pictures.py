@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
@@ -26,21 +27,36 @@ SIZE = (480, 270)
 
 
 class Album:
-    """Takes a pair of pictures at each of the ranges; an `EpisodeObserver`."""
+    """Takes a picture from outside and one through the pilot's camera at some distances; an `EpisodeObserver`."""
 
-    def __init__(self, chase: ChaseCamera) -> None:
-        """Start empty."""
+    def __init__(
+        self,
+        chase: ChaseCamera,
+        distances_m: Sequence[float],
+        distance_m: Callable[[Tick], float],
+        mark: Callable[[Image, Tick], Image] | None = None,
+    ) -> None:
+        """Start empty.
+
+        Args:
+            chase: takes the pictures from outside.
+            distances_m: where pairs are taken, in falling order.
+            distance_m: how far a tick is from the goal.
+            mark: draws on the pilot's picture; nothing without.
+        """
         self.pairs: list[tuple[Image, Image]] = []
-        self._chase = chase
+        self._chase, self._distances_m, self._distance_m, self._mark = chase, distances_m, distance_m, mark
 
     def on_start(self, setup: EpisodeSetup) -> None:
         """Nothing to prepare."""
 
     def on_tick(self, tick: Tick) -> None:
-        """Take a pair when the next range is reached."""
-        reached = len(self.pairs) < len(RANGES_M) and tick.truth.nose_station_m[0] <= RANGES_M[len(self.pairs)]
-        if reached and tick.image is not None:
-            self.pairs.append((self._chase.render(), tick.image.copy()))
+        """Take a pair when the next distance is reached."""
+        if tick.image is None or len(self.pairs) == len(self._distances_m):
+            return
+        if self._distance_m(tick) <= self._distances_m[len(self.pairs)]:
+            image = tick.image.copy()
+            self.pairs.append((self._chase.render(), image if self._mark is None else self._mark(image, tick)))
 
     def on_end(self, result: EpisodeResult) -> None:
         """Nothing to do."""
@@ -49,17 +65,22 @@ class Album:
         """Release the chase camera."""
         self._chase.close()
 
+    def save(self, out: Path, size: tuple[int, int]) -> None:
+        """Write all pairs side by side, each picture at a size of (width, height) px."""
+        columns: list[Image] = []
+        for pair in self.pairs:
+            small = [np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8) for image in pair]
+            columns.append(np.vstack(small))
+        cv2.imwrite(str(out), np.hstack(columns)[:, :, ::-1])
+
 
 def main(out: Path) -> None:
     """Fly the standard task and write the picture."""
     runner = EpisodeRunner(level_cfg(1))
-    album = Album(ChaseCamera(runner.world.simulator))
+    chase = ChaseCamera(runner.world.simulator)
+    album = Album(chase, RANGES_M, lambda tick: float(tick.truth.nose_station_m[0]))
     runner.run(1, [album])
-    columns: list[Image] = []
-    for pair in album.pairs:
-        resized = [np.asarray(cv2.resize(image, SIZE, interpolation=cv2.INTER_AREA), dtype=np.uint8) for image in pair]
-        columns.append(np.vstack(resized))
-    cv2.imwrite(str(out), np.hstack(columns)[:, :, ::-1])
+    album.save(out, SIZE)
 
 
 if __name__ == "__main__":

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import product
 from typing import Annotated, Any, Literal
 
@@ -13,16 +12,11 @@ from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError, located
 from auvdock.core.limits import Positive, at_least, below, between
 from auvdock.core.strict import from_mapping
-from auvdock.episode.config import LEVELS, AnyEpisodeCfg, landing_level_cfg, level_cfg
+from auvdock.episode.config import LEVELS, AnyEpisodeCfg
+from auvdock.episode.stations import STATIONS
 
-__all__ = ["STATIONS", "CampaignCfg", "campaign_from_plain"]
+__all__ = ["CampaignCfg", "campaign_from_plain"]
 
-STATIONS: Mapping[str, Callable[[int], AnyEpisodeCfg]] = {
-    "conical": level_cfg,
-    "rotating": partial(level_cfg, station="rotating"),
-    "landing": landing_level_cfg,
-}
-"""Stations that campaigns can dock into, and what an episode of a difficulty level is there."""
 _MOST_EPISODES = 1_000_000
 """Of which a second each take a core eleven days; their seeds differ (`plan`)."""
 _MOST_CORNERED = 6
@@ -107,7 +101,7 @@ class CampaignCfg(Checked):
         Raises:
             ConfigError: no such level, or changes that do not fit.
         """
-        plain = STATIONS[self.station](level)
+        plain = STATIONS[self.station].level(level)
         with located("episode."):
             return plain.override(self.episode)
 
@@ -117,7 +111,7 @@ class CampaignCfg(Checked):
         Raises:
             ConfigError: no such setting.
         """
-        return axis_kind(type(STATIONS[self.station](self.level)), axis.name)
+        return axis_kind(type(STATIONS[self.station].level(self.level)), axis.name)
 
     def changes(self, axis: AxisCfg, value: AxisValue) -> dict[str, Any]:
         """The nested change of an episode's configuration that a value of an axis stands for.

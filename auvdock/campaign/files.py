@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 from auvdock.campaign.axes import WATER_AXES
-from auvdock.campaign.config import STATIONS, CampaignCfg
-from auvdock.core.landing_station import LandingStationCfg
-from auvdock.core.station import ConicalStationCfg
+from auvdock.campaign.config import CampaignCfg
 from auvdock.core.strict import from_mapping, names_file, read_toml, to_plain
 from auvdock.episode.files import embed_files, read_water
+from auvdock.episode.stations import STATIONS, station_kind
 
-__all__ = ["keep_files", "load_campaign", "station_kind"]
+__all__ = ["keep_files", "load_campaign"]
 
 
 def load_campaign(path: Path) -> CampaignCfg:
@@ -28,7 +27,7 @@ def load_campaign(path: Path) -> CampaignCfg:
     if not names_file(station):
         return keep_files(from_mapping(CampaignCfg, data))
     cfg = keep_files(from_mapping(CampaignCfg, {**data, "station": station_kind(Path(str(station)))}))
-    base = STATIONS[cfg.station](cfg.level).override({"world": {"station": station}}).override(cfg.episode)
+    base = STATIONS[cfg.station].level(cfg.level).override({"world": {"station": station}}).override(cfg.episode)
     world = {**cfg.episode.get("world", {}), "station": to_plain(base.world.station)}
     return replace(cfg, episode={**cfg.episode, "world": world})
 
@@ -39,20 +38,7 @@ def keep_files(cfg: CampaignCfg) -> CampaignCfg:
     Raises:
         ConfigError: a file that cannot be read or does not fit.
     """
-    episode = embed_files(cfg.episode, type(STATIONS[cfg.station](cfg.level).world.station))
+    episode = embed_files(cfg.episode, type(STATIONS[cfg.station].level(cfg.level).world.station))
     named = [value for axis in cfg.axes if axis.name in WATER_AXES for value in axis.values if names_file(value)]
     waters = {str(value): read_water(Path(str(value))) for value in named}
     return replace(cfg, episode=episode, waters=waters)
-
-
-def station_kind(path: Path) -> str:
-    """Which of `STATIONS` a station's file describes: it has what only landings need, a rotating beacon, or neither.
-
-    Raises:
-        ConfigError: a file that cannot be read.
-    """
-    conical, landing = ({field.name for field in fields(cls)} for cls in (ConicalStationCfg, LandingStationCfg))
-    data = read_toml(path)
-    if (landing - conical) & set(data):
-        return "landing"
-    return "rotating" if "rotating" in data else "conical"

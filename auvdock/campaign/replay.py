@@ -19,7 +19,7 @@ class StoredEpisode:
     """An episode of a campaign.
 
     Attributes:
-        station: that it docks into, a key of `auvdock.campaign.config.STATIONS`.
+        station: that it docks into, a key of `auvdock.episode.stations.STATIONS`.
         spec: number, seed and place on the axes.
         cfg: its configuration.
         row: what the store holds of it; None if it has not been run.

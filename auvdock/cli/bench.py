@@ -18,8 +18,9 @@ from auvdock.cli.console import output, track
 from auvdock.cli.parsing import at_least, parse
 from auvdock.core.errors import GraphicsError
 from auvdock.envs.docking import DockingEnv
-from auvdock.episode.config import AnyEpisodeCfg, landing_level_cfg, level_cfg
+from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.episode.runner import EpisodeRunner
+from auvdock.episode.stations import STATIONS
 from auvdock.sim.mj import mujoco
 
 __all__ = ["Bench", "run"]
@@ -147,7 +148,7 @@ class _StageClock:
     def attach(self, runner: EpisodeRunner) -> None:
         self._wrap(runner.world, "step", "physics")
         self._wrap(runner.world, "sense", "optics")
-        self._wrap(runner, "perceive", "perception")
+        self._wrap(runner.perceiver, "perceive", "perception")
         self._wrap(runner.pilot, "step", "pilot")
 
     def _wrap(self, owner: Any, method: str, name: str) -> None:  # noqa: ANN401
@@ -168,8 +169,7 @@ class _StageClock:
 
 
 def _cfg(fidelity: str, station: str = "conical") -> AnyEpisodeCfg:
-    change = {"world": {"fidelity": fidelity}}
-    return landing_level_cfg(1).override(change) if station == "landing" else level_cfg(1, station).override(change)
+    return STATIONS[station].level(1).override({"world": {"fidelity": fidelity}})
 
 
 def _print(report: dict[str, Any]) -> None:

@@ -40,4 +40,4 @@ class DockConical(DockFlags):
 
 def run_conical(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
-    return run_dock(DockConical, argv, prog, "conical", "conical docking")
+    return run_dock(DockConical, argv, prog, "conical")

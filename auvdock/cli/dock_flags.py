@@ -17,7 +17,7 @@ from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.optics.gl import probe_gl
 from auvdock.sim.mj import GL_REFUSAL
 
-__all__ = ["DockFlags"]
+__all__ = ["DockFlags", "working_fidelity"]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class DockFlags(ABC):
         changes: dict[str, Any] = {}
         world: dict[str, Any] = changes.setdefault("world", {})
         if self.fidelity is not None:
-            world["fidelity"] = _working_fidelity() if self.fidelity == "auto" else self.fidelity
+            world["fidelity"] = working_fidelity() if self.fidelity == "auto" else self.fidelity
         if self.water is not None:
             world["water"] = self.water
         if self.attenuation is not None:
@@ -91,7 +91,8 @@ class DockFlags(ABC):
         return changes
 
 
-def _working_fidelity() -> str:
+def working_fidelity() -> str:
+    """`pixels` where OpenGL works, else `beacons`."""
     try:
         probe_gl()
     except GraphicsError as error:

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 from auvdock.campaign.replay import stored_episode
-from auvdock.cli.dock import run_conical
-from auvdock.cli.dock_landing import run_landing
-from auvdock.cli.dock_rotating import run_rotating
 from auvdock.cli.dock_run import reference_in
+from auvdock.cli.main import find_run
 from auvdock.core.errors import ConfigError
+from auvdock.episode.stations import STATIONS
 
 __all__ = ["run_from"]
-
-RUN: Mapping[str, Callable[[Sequence[str], str], int]] = {
-    "conical": run_conical,
-    "rotating": run_rotating,
-    "landing": run_landing,
-}
-"""Command of each station of `auvdock.campaign.config.STATIONS`."""
 
 
 def run_from(argv: Sequence[str], prog: str) -> int:
@@ -30,10 +22,10 @@ def run_from(argv: Sequence[str], prog: str) -> int:
     """
     reference = reference_in(argv)
     if reference is None and {"-h", "--help"} & set(argv):
-        print(f"usage: {prog} {{{','.join(RUN)}}} [--help] ...\n       {prog} --from DIR#EPISODE ...")
+        print(f"usage: {prog} {{{','.join(STATIONS)}}} [--help] ...\n       {prog} --from DIR#EPISODE ...")
         return 0
     if reference is None:
         given = argv[0] if argv else ""
-        raise ConfigError("dock", given, f"a station ({', '.join(RUN)}), or --from DIR#EPISODE of a campaign")
+        raise ConfigError("dock", given, f"a station ({', '.join(STATIONS)}), or --from DIR#EPISODE of a campaign")
     station = stored_episode(reference).station
-    return RUN[station](argv, f"{prog} {station}")
+    return find_run(("dock", station))(argv, f"{prog} {station}")

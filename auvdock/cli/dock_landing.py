@@ -47,4 +47,4 @@ class DockLanding(DockFlags):
 
 def run_landing(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
-    return run_dock(DockLanding, argv, prog, "landing", "landing")
+    return run_dock(DockLanding, argv, prog, "landing")

@@ -56,4 +56,4 @@ class DockRotating(DockConical):
 
 def run_rotating(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
-    return run_dock(DockRotating, argv, prog, "rotating", "docking by the rotating beacon")
+    return run_dock(DockRotating, argv, prog, "rotating")

@@ -26,15 +26,14 @@ from auvdock.episode.trace import EpisodeObserver
 __all__ = ["reference_in", "run_dock"]
 
 
-def run_dock(command: type[DockFlags], argv: Sequence[str], prog: str, station: str, title: str) -> int:
+def run_dock(command: type[DockFlags], argv: Sequence[str], prog: str, station: str) -> int:
     """Run a docking command.
 
     Args:
         command: its flags.
         argv: what the user gave.
         prog: the command's name, for its help.
-        station: key of `auvdock.campaign.config.STATIONS`.
-        title: of the result's table.
+        station: key of `auvdock.episode.stations.STATIONS`.
 
     Returns:
         The exit code.
@@ -46,8 +45,8 @@ def run_dock(command: type[DockFlags], argv: Sequence[str], prog: str, station: 
         check_recordable(args.record)  # now: to make a world takes a minute where its loops have to be compiled
     runner = EpisodeRunner(args.resolve())
     if stored is None or (runner.cfg, args.seed) != (stored.cfg, stored.spec.seed):
-        return _fly(runner, args, title)  # no episode of a campaign, or flags made it another one
-    return _fly(runner, args, title, lambda result: _tell_whether_equal(stored, result))
+        return _fly(runner, args, station)  # no episode of a campaign, or flags made it another one
+    return _fly(runner, args, station, lambda result: _tell_whether_equal(stored, result))
 
 
 def reference_in(argv: Sequence[str]) -> str | None:
@@ -80,7 +79,7 @@ def _defaults(command: type[DockFlags], argv: Sequence[str], stored: StoredEpiso
 
 
 def _fly(
-    runner: EpisodeRunner, flags: DockFlags, title: str, check: Callable[[EpisodeResult], None] | None = None
+    runner: EpisodeRunner, flags: DockFlags, station: str, check: Callable[[EpisodeResult], None] | None = None
 ) -> int:
     cv2.setNumThreads(1)  # frames this small gain nothing from OpenCV's threads and stall on a busy machine
     shown: list[EpisodeObserver] = [] if flags.json else [ProgressDisplay()]
@@ -95,7 +94,7 @@ def _fly(
         failed = {} if flags.record is None else {"recording_error": saving.errors[0] if saving.errors else None}
         print(json.dumps(result.to_json() | failed, allow_nan=False))
     else:
-        print_result(result, None if saving.errors else flags.record, title)
+        print_result(result, station, None if saving.errors else flags.record)
     return saving.finish(exit_codes.DONE if result.success else exit_codes.NOT_MET)
 
 

@@ -22,7 +22,7 @@ from auvdock.core.errors import AuvdockError
 from auvdock.numeric.compiled import cache_folders
 from auvdock.numeric.kept_code import examine_folder
 
-__all__ = ["Check", "Doctor", "examine", "run"]
+__all__ = ["Check", "Doctor", "compiled_loops", "examine", "run"]
 
 PACKAGES = (
     "mujoco",
@@ -80,7 +80,7 @@ def examine() -> list[Check]:
     checks += [_package(name) for name in PACKAGES]
     checks.append(_try("OpenGL (fidelity pixels)", False, _open_gl))
     checks.append(_try("ONNX Runtime", True, _onnx))
-    checks.append(_compiled_loops())
+    checks.append(compiled_loops())
     checks.append(_viewer())
     ray = importlib.util.find_spec("ray") is not None
     checks.append(Check("Ray (many machines)", ray, False, "importable" if ray else "not installed"))
@@ -116,7 +116,7 @@ def _onnx() -> str:
     return ", ".join(onnxruntime.get_available_providers())
 
 
-def _compiled_loops() -> Check:
+def compiled_loops() -> Check:
     """Read all that is kept of what an episode needs, and write to where the rest would go."""
     try:
         import_module("auvdock.episode.runner")  # loads what an episode needs

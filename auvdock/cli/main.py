@@ -17,7 +17,7 @@ from auvdock.cli.streams import forgiving_streams
 from auvdock.core.errors import AuvdockError
 from auvdock.core.memory import relax_collector
 
-__all__ = ["COMMANDS", "main"]
+__all__ = ["COMMANDS", "find_run", "main"]
 
 COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
     ("dock", "conical"): ("auvdock.cli.dock:run_conical", "dock into the conical station, one episode"),
@@ -91,13 +91,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         return exit_codes.with_unwritten(code)
 
 
+def find_run(command: tuple[str, ...]) -> Callable[[Sequence[str], str], int]:
+    """The function that runs one of `COMMANDS`, from the words after it and its name."""
+    module, function = COMMANDS[command][0].split(":")
+    return getattr(import_module(module), function)
+
+
 def _answer(words: list[str]) -> int:
     try:
         command = _find(words)
         if command is None:
             return _usage(words)
-        module, function = COMMANDS[command][0].split(":")
-        run: Callable[[Sequence[str], str], int] = getattr(import_module(module), function)
+        run = find_run(command)
         relax_collector()
         _find_modules_here()
         from auvdock.numeric.compiled import compiling  # half a second, not for a usage message

@@ -23,12 +23,12 @@ from tyro.constructors import (
     StructTypeInfo,
 )
 
-from auvdock.campaign.config import STATIONS
 from auvdock.cli.early_flags import find_flags
 from auvdock.cli.flag_errors import FlagError, one_line
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import names_file, read_toml, recheck
 from auvdock.episode.config import AnyEpisodeCfg
+from auvdock.episode.stations import STATIONS
 from auvdock.optics.water import WaterCfg, load_water
 
 __all__ = [
@@ -145,13 +145,13 @@ def base_config(argv: Sequence[str], station: str) -> AnyEpisodeCfg:
 
     Args:
         argv: what the user gave.
-        station: key of `auvdock.campaign.config.STATIONS`.
+        station: key of `auvdock.episode.stations.STATIONS`.
 
     Raises:
         ConfigError: no such level, or a file that does not fit.
     """
     level, file = level_and_file(argv)
-    cfg = STATIONS[station](level)
+    cfg = STATIONS[station].level(level)
     return cfg.override(read_toml(file)) if file is not None else cfg
 
 

@@ -18,9 +18,9 @@ from rich.text import Text
 from auvdock.campaign.axes import AxisCfg, axis_kind, joined
 from auvdock.campaign.axis_text import parse_axis
 from auvdock.campaign.campaign import CampaignSummary, run_campaign
-from auvdock.campaign.config import STATIONS, CampaignCfg
+from auvdock.campaign.config import CampaignCfg
 from auvdock.campaign.executor import Executor, SerialExecutor
-from auvdock.campaign.files import keep_files, load_campaign, station_kind
+from auvdock.campaign.files import keep_files, load_campaign
 from auvdock.campaign.job import DockingJob
 from auvdock.campaign.process import ProcessExecutor, usable_cores
 from auvdock.campaign.provenance import manifest_of
@@ -32,7 +32,8 @@ from auvdock.cli.parsing import DEFAULT_LEVEL, level_and_file, named_by_flag, pa
 from auvdock.cli.sweep_progress import SweepProgress
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import names_file, read_toml, to_plain
-from auvdock.episode.config import AnyEpisodeCfg, EpisodeCfg, LandingEpisodeCfg
+from auvdock.episode.config import AnyEpisodeCfg, EpisodeCfg
+from auvdock.episode.stations import STATIONS, station_kind
 
 __all__ = ["Sweep", "plain_summary", "print_summary", "run"]
 
@@ -52,7 +53,7 @@ _MOST_WORKERS = 4096
 
 
 @dataclass(frozen=True)
-class SweepFlags:
+class Sweep:
     """Run many episodes over a grid or a distribution of conditions, and store one row each.
 
     A range is low:high:count for a grid, low:high to draw from a distribution, or values with commas between them. Grid
@@ -120,6 +121,7 @@ class SweepFlags:
     """Further axes as NAME=RANGE; a name is a short one or a dotted setting such as world.start.heading_deg."""
     config: Path | None = None
     """TOML file with further settings of the episodes, on top of the level."""
+    episode: Annotated[AnyEpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=EpisodeCfg)
 
     def axes(self, episode: type[AnyEpisodeCfg]) -> list[AxisCfg]:
         """The axes that the flags ask for, in episodes of a configuration.
@@ -142,30 +144,12 @@ class SweepFlags:
         return found
 
 
-@dataclass(frozen=True)
-class Sweep(SweepFlags):
-    """Flags of a campaign whose stations are seen by a bow camera."""
-
-    __doc__ = SweepFlags.__doc__
-    episode: Annotated[EpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=EpisodeCfg)
-
-
-@dataclass(frozen=True)
-class SweepLanding(SweepFlags):
-    """Flags of a campaign of landings."""
-
-    __doc__ = SweepFlags.__doc__
-    episode: Annotated[LandingEpisodeCfg, tyro.conf.arg(name="")] = field(default_factory=LandingEpisodeCfg)
-
-
 def run(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     station = _station(argv)
     base = _base(argv, station)
-    if isinstance(base, LandingEpisodeCfg):
-        args = parse(SweepLanding, argv, prog, SweepLanding(out=tyro.MISSING, episode=base))
-    else:
-        args = parse(Sweep, argv, prog, Sweep(out=tyro.MISSING, episode=base))
+    flags = _with_settings_of(type(base))
+    args = parse(flags, argv, prog, flags(out=tyro.MISSING, episode=base))
     cfg = _resolve(args, args.episode, station)
     if args.workers is not None and not 1 <= args.workers <= _MOST_WORKERS:
         raise ConfigError("workers", args.workers, f"a whole number of 1 or more, up to {_MOST_WORKERS}")
@@ -182,6 +166,14 @@ def run(argv: Sequence[str], prog: str) -> int:
     else:
         print_summary(summary, args.out)
     return 0
+
+
+def _with_settings_of(episode: type[AnyEpisodeCfg]) -> type[Sweep]:
+    """The command's flags with those of one kind of episodes' settings."""
+    own = ("episode", Annotated[episode, tyro.conf.arg(name="")], field(default_factory=episode))
+    made = dataclasses.make_dataclass("Sweep", [own], bases=(Sweep,), frozen=True)
+    made.__doc__ = Sweep.__doc__
+    return made
 
 
 def _station(argv: Sequence[str]) -> str:
@@ -201,7 +193,7 @@ def _station(argv: Sequence[str]) -> str:
 
 def _base(argv: Sequence[str], station: str) -> AnyEpisodeCfg:
     """What `--level` and `--config` ask for; other flags change single fields of it."""
-    make = STATIONS[station]
+    make = STATIONS[station].level
     if {"-h", "--help"} & set(argv):
         return make(DEFAULT_LEVEL)
     level, file = level_and_file(_single_level(argv))
@@ -223,7 +215,7 @@ def _single_level(argv: Sequence[str]) -> list[str]:
     return words
 
 
-def _resolve(args: SweepFlags, episode: AnyEpisodeCfg, station: str) -> CampaignCfg:
+def _resolve(args: Sweep, episode: AnyEpisodeCfg, station: str) -> CampaignCfg:
     changes = _difference(to_plain(_start(args, station)), to_plain(episode))
     axes = args.axes(type(episode))
     if args.station is not None and args.station not in STATIONS:
@@ -256,9 +248,11 @@ def _resolve(args: SweepFlags, episode: AnyEpisodeCfg, station: str) -> Campaign
         return keep_files(wanted)
 
 
-def _start(args: SweepFlags, station: str) -> AnyEpisodeCfg:
+def _start(args: Sweep, station: str) -> AnyEpisodeCfg:
     """What the flags' changes are relative to: the level that the campaign applies again to each episode."""
-    return STATIONS[station](int(args.level) if args.level is not None and "," not in args.level else DEFAULT_LEVEL)
+    return STATIONS[station].level(
+        int(args.level) if args.level is not None and "," not in args.level else DEFAULT_LEVEL
+    )
 
 
 def _difference(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
@@ -275,7 +269,7 @@ def _difference(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]
     return changes
 
 
-def _executor(args: SweepFlags, cfg: CampaignCfg) -> Executor:
+def _executor(args: Sweep, cfg: CampaignCfg) -> Executor:
     if args.executor == "serial":
         return SerialExecutor(cfg.wall_limit_s)
     if args.executor == "ray":

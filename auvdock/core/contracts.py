@@ -26,6 +26,7 @@ __all__ = [
     "PoseEstimate",
     "Proprioception",
     "RegionOfInterest",
+    "Sensed",
     "TagDetection",
     "TrackView",
 ]
@@ -289,6 +290,23 @@ class Proprioception:
             return  # the common case, at a third of the cost
         for name in ("euler_zyx_rad", "angular_velocity_rad_s", "velocity_ground_m_s", "velocity_water_m_s"):
             check_shape(name, getattr(self, name), (3,))
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What the vehicle can know at one moment.
+
+    Attributes:
+        proprioception: its own sensors.
+        frame: a new camera frame, None between frames or where `detections` stands in for it.
+        detections: in the `beacons` fidelity, the detections of a new frame, else None.
+        tags: in the `beacons` fidelity of a landing, the tags seen in that frame.
+    """
+
+    proprioception: Proprioception
+    frame: Frame | None = None
+    detections: Detections | None = None
+    tags: tuple[TagDetection, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

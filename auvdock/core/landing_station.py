@@ -123,6 +123,11 @@ class LandingStationCfg(Checked):
         return self.height_m
 
     @property
+    def inside_m(self) -> float:
+        """How far inside the station the latch closes: not at all, the origin is where the way ends."""
+        return 0.0
+
+    @property
     def layout(self) -> BeaconLayout:
         """All lights."""
         return BeaconLayout(self.beacons)

@@ -97,6 +97,11 @@ class ConicalStationCfg(Checked):
             raise ConfigError("floor_below_m", self.floor_below_m, remedy)
 
     @property
+    def inside_m(self) -> float:
+        """How far the nose is inside the mouth where the latch can close."""
+        return self.funnel.length_m + self.latch.depth_m
+
+    @property
     def layout(self) -> BeaconLayout:
         """All lights, the array first."""
         return conical_layout(self)

@@ -10,4 +10,4 @@ from auvdock.core.station import ConicalStationCfg
 __all__ = ["StationCfg"]
 
 StationCfg: TypeAlias = ConicalStationCfg | LandingStationCfg
-"""What the simulator can hold: each has `depth_m`, `floor_below_m`, `latch.hold_s` and a `layout` of lights."""
+"""What the simulator can hold: its `depth_m`, `floor_below_m`, `inside_m`, `latch.hold_s`, `layout` of lights."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Self, TypeAlias
 
 from auvdock.assets import asset
 from auvdock.controllers.landing.config import LandingControlCfg
@@ -34,42 +34,38 @@ LEVEL_STATIONS = ("conical", "rotating")
 """Stations whose worlds are an `EpisodeCfg`."""
 
 
+class _Episode(Checked):
+    """What the configurations of all episodes can do."""
+
+    world: Any
+
+    def override(self, changes: Mapping[str, Any]) -> Self:
+        """A copy with nested fields replaced, checked as strictly as a TOML file.
+
+        A station's or water's file is read now: the copy holds what it says.
+
+        Raises:
+            ConfigError: an unknown key or a value that does not fit.
+        """
+        return merge(self, embed_files(changes, type(self.world.station)))
+
+
 @dataclass(frozen=True)
-class EpisodeCfg(Checked):
+class EpisodeCfg(_Episode):
     """One docking episode."""
 
     world: WorldCfg = WorldCfg()
     perception: PerceptionCfg = PerceptionCfg()
     control: ControlCfg = ControlCfg()
 
-    def override(self, changes: Mapping[str, Any]) -> EpisodeCfg:
-        """A copy with nested fields replaced, checked as strictly as a TOML file.
-
-        A station's or water's file is read now: the copy holds what it says.
-
-        Raises:
-            ConfigError: an unknown key or a value that does not fit.
-        """
-        return merge(self, embed_files(changes, type(self.world.station)))
-
 
 @dataclass(frozen=True)
-class LandingEpisodeCfg(Checked):
+class LandingEpisodeCfg(_Episode):
     """One landing episode."""
 
     world: LandingWorldCfg = LandingWorldCfg()
     perception: LandingPerceptionCfg = LandingPerceptionCfg()
     control: LandingControlCfg = LandingControlCfg()
-
-    def override(self, changes: Mapping[str, Any]) -> LandingEpisodeCfg:
-        """A copy with nested fields replaced, checked as strictly as a TOML file.
-
-        A station's or water's file is read now: the copy holds what it says.
-
-        Raises:
-            ConfigError: an unknown key or a value that does not fit.
-        """
-        return merge(self, embed_files(changes, type(self.world.station)))
 
 
 AnyEpisodeCfg: TypeAlias = EpisodeCfg | LandingEpisodeCfg

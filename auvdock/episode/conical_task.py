@@ -1,117 +1,50 @@
-"""Docking into the conical station."""
+"""Docking into the conical station, with or without a rotating beacon."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from functools import partial
 
-from auvdock.controllers.named import find_pilot, make_named_pilot
-from auvdock.controllers.pilot import ConicalPilot, Pilot
+from auvdock.controllers.pilot import ConicalPilot
 from auvdock.controllers.rotating.pilot import RotatingPilot
-from auvdock.core.contracts import Percept
-from auvdock.core.errors import located
-from auvdock.envs.vehicle_world import Sensed
-from auvdock.envs.world import DockingWorld
+from auvdock.core.arrays import Array
+from auvdock.core.camera import Camera
+from auvdock.core.station import ConicalStationCfg
+from auvdock.envs.perceived import perceived_docking
 from auvdock.episode.config import EpisodeCfg
 from auvdock.episode.metrics import GuidanceMetrics
-from auvdock.episode.result import stage_of
 from auvdock.episode.rotating_metrics import RotatingMetrics
-from auvdock.episode.trace import Tick
-from auvdock.perception.detectors import make_station_detector
-from auvdock.perception.pipeline import BeaconPerception
-from auvdock.sim.truth import Truth
+from auvdock.episode.task import Metrics, Task, make_pilot
 
-__all__ = ["ConicalTask"]
+__all__ = ["conical_task"]
 
-_STAGES = {"acquire": "search", "abort": "timeout", "docked": "terminal"}
-"""Guidance modes whose failure cause has another name."""
+_STAGES: Mapping[str, str] = {"acquire": "search", "abort": "timeout", "docked": "terminal"}
 
 
-class ConicalTask:
-    """Implements `auvdock.episode.task.Task` for `EpisodeCfg`."""
+def conical_task(cfg: EpisodeCfg) -> Task:
+    """The task; its own pilot is the rotating beacon's if there is one or the station's heading is unknown.
 
-    def __init__(self, cfg: EpisodeCfg) -> None:
-        """Build world, detector, perception and pilot.
-
-        Raises:
-            ConfigError: a name that does not exist or a value that does not fit.
-        """
-        self._cfg = cfg
-        self.station = cfg.world.station
-        self.name = "conical station" if self.station.rotating is None else "rotating beacon"
-        self.detector = cfg.perception.detector
-        with located("perception."):
-            self._detector = make_station_detector(self.detector, self.station)
-        with located("control."):
-            find_pilot(cfg.control.controller)  # before the world, whose loops may have to be compiled
-        self.world = DockingWorld(cfg.world, self.detector)
-        self._perception = BeaconPerception(
-            cfg.perception,
-            self.world.camera,
-            self.station.layout,
-            self.station.rotating,
-            heading_surveyed=cfg.world.station_heading == "surveyed",
-        )
-        with located("control."):
-            self.pilot = make_pilot(cfg, self.world)
-
-    def reset(self) -> None:
-        """Forget the tracks."""
-        self._perception.reset()
-
-    def perceive(self, sensed: Sensed) -> Percept | None:
-        """Perception's answer to what was sensed; None if there was no new frame."""
-        if sensed.frame is not None:
-            return self._perception.update(self._detector.detect(sensed.frame), sensed.proprioception)
-        if sensed.detections is not None:
-            return self._perception.update(sensed.detections, sensed.proprioception)
-        return None
-
-    def metrics(self) -> ConicalMetrics:
-        """Metrics of a new episode."""
-        camera, T_world_station = self.world.camera, self.world.simulator.T_world_station
-        rotating = None
-        if isinstance(self.pilot, RotatingPilot):
-            rotating = RotatingMetrics(camera, T_world_station, self.station.rotating)
-        return ConicalMetrics(GuidanceMetrics(camera, self.station, T_world_station), rotating)
-
-    def stage(self, mode: str) -> str:
-        """The failure reason of an episode that ends in a guidance mode."""
-        return stage_of(mode, _STAGES)
-
-
-class ConicalMetrics:
-    """Precise guidance as paper A counts it, how the nose passed the throat, and how the rotating beacon led."""
-
-    def __init__(self, guidance: GuidanceMetrics, rotating: RotatingMetrics | None = None) -> None:
-        """Start empty."""
-        self._guidance, self._rotating = guidance, rotating
-
-    def add(self, tick: Tick) -> None:
-        """Count one control period; for guidance those without a frame count nothing."""
-        if self._rotating is not None:
-            self._rotating.add(tick)
-        if tick.percept is not None:
-            self._guidance.add(tick.truth, tick.percept)
-
-    def fields(self, truth: Truth) -> Mapping[str, Any]:
-        """Guidance and entry, named as in `EpisodeResult`."""
-        return {
-            **vars(self._guidance.summary()),
-            "lateral_error_m": truth.entry_lateral_m,
-            "vertical_error_m": truth.entry_vertical_m,
-            "heading_error_rad": truth.entry_angle_rad,
-            "entry_speed_m_s": truth.entry_speed_m_s,
-            **(self._rotating.fields() if self._rotating is not None else {}),
-        }
-
-
-def make_pilot(cfg: EpisodeCfg, world: DockingWorld) -> Pilot[Any]:
-    """The pilot that the settings name, or the station's own.
-
-    That is the rotating beacon's if there is one or the station's heading is unknown, else the conical one.
+    Raises:
+        ConfigError: a name that does not exist or a value that does not fit.
     """
-    found_anywhere = cfg.world.station.rotating is not None or cfg.world.station_heading == "unknown"
-    kind = RotatingPilot if found_anywhere else ConicalPilot
-    vehicle, dt_s = world.simulator.vehicle, 1.0 / cfg.world.control_hz
-    return make_named_pilot(cfg.control.controller, kind, cfg.control, vehicle, cfg.world.station, world.camera, dt_s)
+    station = cfg.world.station
+    world, perceiver = perceived_docking(cfg.world, cfg.perception)
+    found_anywhere = station.rotating is not None or cfg.world.station_heading == "unknown"
+    pilot = make_pilot(cfg, world, RotatingPilot if found_anywhere else ConicalPilot)
+    by_beacon = isinstance(pilot, RotatingPilot)
+    return Task(
+        kind="conical" if station.rotating is None else "rotating",
+        station=station,
+        detector=cfg.perception.detector,
+        world=world,
+        perceiver=perceiver,
+        pilot=pilot,
+        metrics=partial(_metrics, world.camera, station, world.simulator.T_world_station, by_beacon),
+        stages=_STAGES,
+    )
+
+
+def _metrics(camera: Camera, station: ConicalStationCfg, T_world_station: Array, by_beacon: bool) -> list[Metrics]:
+    """Precise guidance as paper A counts it, how the nose passed the throat, and how the rotating beacon led."""
+    metrics: list[Metrics] = [GuidanceMetrics(camera, station, T_world_station)]
+    return [*metrics, RotatingMetrics(camera, T_world_station, station.rotating)] if by_beacon else metrics

@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
-from auvdock.core.contracts import Percept
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.transforms import invert
 from auvdock.episode.false_poses import FalsePoses
+from auvdock.episode.trace import Tick
 from auvdock.sim.truth import Truth
 
-__all__ = ["GuidanceMetrics", "GuidanceSummary"]
-
-
-@dataclass(frozen=True)
-class GuidanceSummary:
-    """Precise-guidance metrics of an episode, named as in `EpisodeResult`."""
-
-    distortion_rate: float | None
-    precise_frames: int
-    invalid_frames: int
-    entry_distance_m: float | None
-    precise_range_m: float | None
-    pose_error_median_m: float | None
-    measured_poses: int
-    false_poses: int
-    false_pose_rate: float | None
+__all__ = ["GuidanceMetrics"]
 
 
 class GuidanceMetrics:
@@ -54,8 +40,11 @@ class GuidanceMetrics:
         self._measured_m: list[Array] = []
         self._unmeasured: list[Array] = []
 
-    def add(self, truth: Truth, percept: Percept) -> None:
-        """Count one frame."""
+    def add(self, tick: Tick) -> None:
+        """Count one control period; those without a frame count nothing."""
+        truth, percept = tick.truth, tick.percept
+        if percept is None:
+            return
         measured = percept.pose is not None and percept.pose.measured
         if not self._true_m and not measured:
             return
@@ -65,8 +54,8 @@ class GuidanceMetrics:
         else:
             self._unmeasured.append(truth.T_world_body)
 
-    def summary(self) -> GuidanceSummary:
-        """The metrics so far."""
+    def fields(self, truth: Truth) -> Mapping[str, Any]:
+        """Guidance so far and how the nose passed the throat, named as in `EpisodeResult`."""
         entry_m = last_m = error_m = None
         poses = FalsePoses.count((), ())
         if self._true_m:
@@ -77,15 +66,19 @@ class GuidanceMetrics:
             poses = FalsePoses.count(errors_m, np.linalg.norm(camera_m, axis=1))
         invalid = self._invalid_frames()
         precise = len(self._true_m) + invalid
-        return GuidanceSummary(
-            distortion_rate=invalid / precise if precise else None,
-            precise_frames=precise,
-            invalid_frames=invalid,
-            entry_distance_m=entry_m,
-            precise_range_m=None if entry_m is None or last_m is None else entry_m - last_m,
-            pose_error_median_m=error_m,
+        return {
+            "distortion_rate": invalid / precise if precise else None,
+            "precise_frames": precise,
+            "invalid_frames": invalid,
+            "entry_distance_m": entry_m,
+            "precise_range_m": None if entry_m is None or last_m is None else entry_m - last_m,
+            "pose_error_median_m": error_m,
             **vars(poses),
-        )
+            "lateral_error_m": truth.entry_lateral_m,
+            "vertical_error_m": truth.entry_vertical_m,
+            "heading_error_rad": truth.entry_angle_rad,
+            "entry_speed_m_s": truth.entry_speed_m_s,
+        }
 
     def _invalid_frames(self) -> int:
         """Frames without a measured pose in which enough of the array lies in view."""

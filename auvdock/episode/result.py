@@ -55,7 +55,7 @@ def stage_of(mode: str, names: Mapping[str, str]) -> str:
     return reason if reason in FAILURE_REASONS else "timeout"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class EpisodeResult:
     """Outcome and metrics of one episode; NaN never appears, None stands for "did not happen"."""
 
@@ -81,12 +81,12 @@ class EpisodeResult:
     energy_j: float
     """Hydraulic work of the thrusters by actuator-disc theory (`auvdock.sim.actuation.Actuators.power_w`)."""
     peak_contact_force_n: float
-    lateral_error_m: float | None
+    lateral_error_m: float | None = None
     """Sideways distance of the nose from the tube's axis as it crosses the throat; positive is +y of the station."""
-    vertical_error_m: float | None
-    heading_error_rad: float | None
+    vertical_error_m: float | None = None
+    heading_error_rad: float | None = None
     """Angle between hull and tube axis at the same moment."""
-    entry_speed_m_s: float | None
+    entry_speed_m_s: float | None = None
     """Speed along the axis as the nose crosses the throat."""
     pose_error_median_m: float | None
     """Median distance between measured and true camera position in precise guidance."""

@@ -15,6 +15,7 @@ from auvdock.core.camera import Camera
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.transforms import invert
 from auvdock.episode.trace import Tick
+from auvdock.sim.truth import Truth
 
 __all__ = ["RotatingMetrics"]
 
@@ -76,7 +77,7 @@ class RotatingMetrics:
         if believed is not None:
             self._believed_error = math.remainder(believed - azimuth, math.tau)
 
-    def fields(self) -> Mapping[str, Any]:
+    def fields(self, truth: Truth) -> Mapping[str, Any]:
         """Named as in `EpisodeResult`."""
         found = [moment for moment in (self._fix_s, self._pose_s) if moment is not None]
         count = len(self._errors)

@@ -10,12 +10,11 @@ from importlib.metadata import version
 import cv2
 import numpy as np
 
-from auvdock.core.contracts import Percept
 from auvdock.core.strict import to_plain
-from auvdock.envs.vehicle_world import Sensed
 from auvdock.episode.config import AnyEpisodeCfg
-from auvdock.episode.result import EpisodeResult
-from auvdock.episode.task import TaskMetrics, make_task
+from auvdock.episode.result import EpisodeResult, stage_of
+from auvdock.episode.stations import STATIONS, make_task
+from auvdock.episode.task import Metrics
 from auvdock.episode.trace import EpisodeObserver, EpisodeSetup, Tick
 from auvdock.sim.mj import mujoco
 
@@ -38,7 +37,7 @@ class EpisodeRunner:
     """Runs episodes of one configuration; reusable, since building the world costs more than resetting it."""
 
     def __init__(self, cfg: AnyEpisodeCfg) -> None:
-        """Build world, detector, perception and pilot.
+        """Build world, perception and pilot.
 
         Raises:
             ConfigError: a name that does not exist or a value that does not fit.
@@ -46,13 +45,10 @@ class EpisodeRunner:
         self.cfg = cfg
         self.task = make_task(cfg)
         self.world = self.task.world
+        self.perceiver = self.task.perceiver
         self.pilot = self.task.pilot
         self._plain_config = to_plain(cfg)
         self._versions = software_versions()
-
-    def perceive(self, sensed: Sensed) -> Percept | None:
-        """Perception's answer to what was sensed; None if there was no new frame."""
-        return self.task.perceive(sensed)
 
     def run(self, seed: int, observers: Sequence[EpisodeObserver] = ()) -> EpisodeResult:
         """Run one episode to its end.
@@ -69,7 +65,8 @@ class EpisodeRunner:
                 observer.on_start(setup)
             try:
                 for tick in self._ticks(seed, flight):
-                    metrics.add(tick)
+                    for each in metrics:
+                        each.add(tick)
                     for observer in observers:
                         observer.on_tick(tick)
             except KeyboardInterrupt:
@@ -84,30 +81,31 @@ class EpisodeRunner:
     def _ticks(self, seed: int, flight: _Flight) -> Iterator[Tick]:
         world = self.world
         world.reset(seed)
-        self.task.reset()
+        self.perceiver.reset()
         state = self.pilot.initial_state()
         while True:
             sensed = world.sense()
-            percept = self.perceive(sensed)
+            percept = self.perceiver.perceive(sensed)
             command, state = self.pilot.step(state, percept, sensed.proprioception)
             flight.count(command.mode)
             image = sensed.frame.image if sensed.frame is not None else None
             yield Tick(world.truth, sensed.proprioception, image, percept, command)
             if command.giving_up:
-                flight.failure_reason = self.task.stage(flight.stage)
+                flight.failure_reason = stage_of(flight.stage, self.task.stages)
                 return
             world.step(command.values)
             if world.is_success:
                 return
             end = world.end
             if end is not None:
-                flight.failure_reason = self.task.stage(flight.mode) if end == "timeout" else end
+                flight.failure_reason = stage_of(flight.mode, self.task.stages) if end == "timeout" else end
                 return
 
     def _setup(self, seed: int) -> EpisodeSetup:
         world = self.world
         return EpisodeSetup(
-            title=f"{self.task.name}, seed {seed}, {self.cfg.world.fidelity}",
+            title=f"{STATIONS[self.task.kind].name}, seed {seed}, {self.cfg.world.fidelity}",
+            kind=self.task.kind,
             station=self.task.station,
             vehicle=world.simulator.vehicle,
             camera=world.camera,
@@ -122,9 +120,10 @@ class EpisodeRunner:
             observer.on_end(result)
         return result
 
-    def _result(self, seed: int, metrics: TaskMetrics, flight: _Flight, started: float) -> EpisodeResult:
+    def _result(self, seed: int, metrics: Sequence[Metrics], flight: _Flight, started: float) -> EpisodeResult:
         truth = self.world.truth
         wall_s = time.perf_counter() - started
+        measured = {name: value for each in metrics for name, value in each.fields(truth).items()}
         return EpisodeResult(
             success=self.world.is_success and flight.failure_reason is None,
             failure_reason=flight.failure_reason,
@@ -138,7 +137,7 @@ class EpisodeRunner:
             real_time_factor=truth.time_s / wall_s if wall_s > 0.0 else 0.0,
             versions=self._versions,
             config=self._plain_config,
-            **metrics.fields(truth),
+            **measured,
         )
 
 

@@ -1,86 +1,68 @@
-"""What an episode is made of, and which task a configuration asks for."""
+"""What an episode is made of."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
+from auvdock.controllers.named import PilotFactory, make_named_pilot
 from auvdock.controllers.pilot import Pilot
-from auvdock.core.contracts import Percept
+from auvdock.core.errors import located
 from auvdock.core.stations import StationCfg
-from auvdock.envs.vehicle_world import Sensed, VehicleWorld
-from auvdock.episode.config import AnyEpisodeCfg, LandingEpisodeCfg
-from auvdock.episode.conical_task import ConicalTask
-from auvdock.episode.landing_task import LandingTask
+from auvdock.envs.vehicle_world import VehicleWorld
+from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.episode.trace import Tick
+from auvdock.perception.perceiver import Perceiver
 from auvdock.sim.truth import Truth
 
-__all__ = ["Task", "TaskMetrics", "make_task"]
+__all__ = ["Metrics", "Task", "make_pilot"]
 
 
-class TaskMetrics(Protocol):
-    """Gathers an episode's metrics tick by tick."""
+class Metrics(Protocol):
+    """Gathers some of an episode's metrics tick by tick."""
 
     def add(self, tick: Tick) -> None:
         """Take in one control period."""
         ...
 
     def fields(self, truth: Truth) -> Mapping[str, Any]:
-        """The fields of `EpisodeResult` that this kind of docking fills, at the episode's end; the others keep None."""
+        """The fields of `EpisodeResult` that it fills, at the episode's end; what nobody fills keeps None."""
         ...
 
 
-class Task(Protocol):
-    """One kind of docking: a world, what perceives it, who flies in it, and how it is judged."""
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One kind of docking: a world, what perceives it, who flies in it, and how it is judged.
 
-    @property
-    def name(self) -> str:
-        """The kind of station, for titles."""
-        ...
+    Attributes:
+        kind: of the station, one of `auvdock.episode.stations.STATIONS`.
+        station: the station.
+        detector: name of the detector.
+        world: vehicle, station, water and camera.
+        perceiver: makes percepts of what the vehicle senses.
+        pilot: flies the vehicle.
+        metrics: makes the metrics of a new episode.
+        stages: failure reasons of guidance modes that have another name (`auvdock.episode.result.stage_of`).
+    """
 
-    @property
-    def station(self) -> StationCfg:
-        """The station."""
-        ...
-
-    @property
-    def detector(self) -> str:
-        """Name of the detector."""
-        ...
-
-    @property
-    def world(self) -> VehicleWorld:
-        """Vehicle, station, water and camera."""
-        ...
-
-    @property
-    def pilot(self) -> Pilot[Any]:
-        """Flies the vehicle."""
-        ...
-
-    def reset(self) -> None:
-        """Forget the episode before; the world is reset apart from this."""
-        ...
-
-    def perceive(self, sensed: Sensed) -> Percept | None:
-        """Perception's answer to what was sensed; None if there was no new frame."""
-        ...
-
-    def metrics(self) -> TaskMetrics:
-        """Metrics of a new episode."""
-        ...
-
-    def stage(self, mode: str) -> str:
-        """The failure reason (`FAILURE_REASONS`) of an episode that ends in a guidance mode."""
-        ...
+    kind: str
+    station: StationCfg
+    detector: str
+    world: VehicleWorld
+    perceiver: Perceiver
+    pilot: Pilot[Any]
+    metrics: Callable[[], Sequence[Metrics]]
+    stages: Mapping[str, str]
 
 
-def make_task(cfg: AnyEpisodeCfg) -> Task:
-    """The task that a configuration asks for.
+def make_pilot(cfg: AnyEpisodeCfg, world: VehicleWorld, own: PilotFactory) -> Pilot[Any]:
+    """The pilot that the settings name; `own` makes the package's.
 
     Raises:
-        ConfigError: a name that does not exist or a value that does not fit.
+        ConfigError: nothing of that name, or an object that is no pilot.
     """
-    if isinstance(cfg, LandingEpisodeCfg):
-        return LandingTask(cfg)
-    return ConicalTask(cfg)
+    vehicle, station, control = world.simulator.vehicle, cfg.world.station, cfg.control
+    with located("control."):
+        period_s = 1.0 / cfg.world.control_hz
+        return make_named_pilot(control.controller, own, control, vehicle, station, world.camera, period_s)

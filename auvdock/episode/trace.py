@@ -22,6 +22,7 @@ class EpisodeSetup:
 
     Attributes:
         title: station, seed and fidelity in a few words.
+        kind: of the station, one of `auvdock.episode.stations.STATIONS`.
         station: the station with its lights.
         vehicle: the vehicle.
         camera: the camera that the pilot looks through.
@@ -31,6 +32,7 @@ class EpisodeSetup:
     """
 
     title: str
+    kind: str
     station: StationCfg
     vehicle: VehicleCfg
     camera: Camera

@@ -10,7 +10,10 @@ import rerun as rr
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.recording import paths
 
-__all__ = ["Batch"]
+__all__ = ["PIXEL_CORNER", "Batch"]
+
+PIXEL_CORNER = 0.5
+"""Rerun's (0, 0) is the corner of the first pixel, this package's its centre."""
 
 
 class Batch:

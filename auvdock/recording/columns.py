@@ -10,25 +10,21 @@ import numpy as np
 import rerun as rr
 
 from auvdock.core.arrays import Array
-from auvdock.core.landing_station import LandingStationCfg
 from auvdock.recording import paths
-from auvdock.recording.batch import Batch
-from auvdock.recording.landing_columns import LandingColumns
+from auvdock.recording.batch import PIXEL_CORNER, Batch
 from auvdock.recording.modes import ModeFollower
 from auvdock.recording.palette import CANDIDATE, IDENTIFIED, LOST, class_colours
 from auvdock.recording.pose_error import camera_in_station, pose_errors
-from auvdock.recording.rotating import write_rotating
 
 if TYPE_CHECKING:
     from auvdock.core.contracts import Percept, PoseEstimate
     from auvdock.episode.trace import EpisodeSetup, Tick
+    from auvdock.recording.part import StationPart
 
 __all__ = ["ColumnWriter", "Row"]
 
 _ARROW_M_PER_M_S = 4.0
 """Length of the current's arrow: at 0.25 m/s it is a metre long."""
-_PIXEL_CORNER = 0.5
-"""Rerun's (0, 0) is the corner of the first pixel, this package's its centre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +45,12 @@ class Row:
 class ColumnWriter:
     """Writes batches of rows to a stream."""
 
-    def __init__(self, stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
+    def __init__(self, stream: rr.RecordingStream, setup: EpisodeSetup, part: StationPart) -> None:
         """Begin an episode."""
         self._stream = stream
         self._setup = setup
-        self._landing = LandingColumns(setup) if isinstance(setup.station, LandingStationCfg) else None
-        self._modes = ModeFollower(self._landing is not None)
+        self._part = part
+        self._modes = ModeFollower(part.place)
         self._last_camera_world_m: Array | None = None
 
     def write(self, rows: Sequence[Row]) -> None:
@@ -64,15 +60,12 @@ class ColumnWriter:
         T_world_body = np.array([row.tick.truth.T_world_body for row in rows])
         batch = Batch(self._stream, frames, times_s)
         self._write_motion(batch, rows, T_world_body)
-        self._write_pose(batch, rows, T_world_body)
-        T_station_camera = camera_in_station(
-            self._setup.T_world_station, T_world_body, self._setup.camera.T_body_camera
-        )
-        write_rotating(batch, [row.tick for row in rows], self._setup, T_station_camera)
+        T_body_camera = self._setup.camera.T_body_camera
+        T_station_camera = camera_in_station(self._setup.T_world_station, T_world_body, T_body_camera)
+        self._write_pose(batch, rows, T_station_camera)
+        self._part.write(batch, [row.tick for row in rows], T_station_camera)
         self._write_lights(batch, rows)
         self._write_modes(batch, rows)
-        if self._landing is not None:
-            self._landing.write(batch, [row.tick for row in rows])
         _write_images(batch, rows)
 
     def _write_motion(self, batch: Batch, rows: Sequence[Row], T_world_body: Array) -> None:
@@ -89,9 +82,8 @@ class ColumnWriter:
         batch.scalars(paths.CONTACT, np.array([truth.contact_force_n for truth in truths]))
         batch.scalars(paths.COMMANDS, np.array([row.tick.command.values for row in rows]))
 
-    def _write_pose(self, batch: Batch, rows: Sequence[Row], T_world_body: Array) -> None:
+    def _write_pose(self, batch: Batch, rows: Sequence[Row], T_station_camera: Array) -> None:
         T_world_station = self._setup.T_world_station
-        T_station_camera = camera_in_station(T_world_station, T_world_body, self._setup.camera.T_body_camera)
         self._write_path(batch, (T_world_station @ T_station_camera)[:, :3, 3])
         percepts = [(index, row.tick.percept) for index, row in enumerate(rows) if row.tick.percept is not None]
         if not percepts:
@@ -134,8 +126,8 @@ class ColumnWriter:
     def _write_modes(self, batch: Batch, rows: Sequence[Row]) -> None:
         modes = [row.tick.command.mode for row in rows]
         batch.scalars(paths.MODE_NUMBER, np.array([self._modes.number(mode) for mode in modes], dtype=np.float64))
-        ahead_m = [row.tick.truth.to_go_m for row in rows]
-        followed = (self._modes.follow(index, mode, ahead_m[index]) for index, mode in enumerate(modes))
+        to_go_m = [row.tick.truth.to_go_m for row in rows]
+        followed = (self._modes.follow(index, mode, to_go_m[index]) for index, mode in enumerate(modes))
         changes = [change for change in followed if change is not None]
         if changes:
             at = batch.select(np.array([change.row for change in changes]))
@@ -154,7 +146,7 @@ def _ranges(rows: Sequence[Row]) -> Array:
 
 
 def _write_detections(frames: Batch, percepts: Sequence[Percept]) -> None:
-    xyxy = np.concatenate([percept.detections.xyxy for percept in percepts]) + _PIXEL_CORNER
+    xyxy = np.concatenate([percept.detections.xyxy for percept in percepts]) + PIXEL_CORNER
     colours = class_colours(np.concatenate([percept.detections.class_id for percept in percepts]))
     boxes = rr.Boxes2D.columns(
         centers=(xyxy[:, :2] + xyxy[:, 2:]) / 2.0, half_sizes=(xyxy[:, 2:] - xyxy[:, :2]) / 2.0, colors=colours
@@ -164,7 +156,7 @@ def _write_detections(frames: Batch, percepts: Sequence[Percept]) -> None:
 
 def _write_tracks(frames: Batch, percepts: Sequence[Percept]) -> None:
     tracks = [track for percept in percepts for track in percept.tracks]
-    centres = np.array([track.centre_px for track in tracks]).reshape(-1, 2) + _PIXEL_CORNER
+    centres = np.array([track.centre_px for track in tracks]).reshape(-1, 2) + PIXEL_CORNER
     labels = [f"#{track.track_id}" if track.beacon_id is None else f"B{track.beacon_id}" for track in tracks]
     colours = [LOST if track.missed else (CANDIDATE if track.beacon_id is None else IDENTIFIED) for track in tracks]
     points = rr.Points2D.columns(positions=centres, labels=labels, colors=np.array(colours, dtype=np.uint32))
@@ -177,7 +169,7 @@ def _write_bearings(frames: Batch, percepts: Sequence[Percept]) -> None:
         for percept in percepts
     ]
     flat = [pair for pairs in named for pair in pairs]
-    centres = np.array([bearing.centre_px for bearing, _ in flat]).reshape(-1, 2) + _PIXEL_CORNER
+    centres = np.array([bearing.centre_px for bearing, _ in flat]).reshape(-1, 2) + PIXEL_CORNER
     points = rr.Points2D.columns(positions=centres, labels=[name for _, name in flat])
     frames.send(paths.BEARINGS, points.partition([len(pairs) for pairs in named]))
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import rerun as rr
 import rerun.blueprint as rrb
 
-from auvdock.core.landing_station import LandingStationCfg
 from auvdock.recording import paths
-from auvdock.recording.rotating import beacon_of, rotating_views
+from auvdock.recording.part import StationPart, plot
 
 if TYPE_CHECKING:
     from auvdock.episode.trace import EpisodeSetup
@@ -20,13 +19,12 @@ _ON_THE_IMAGE = (paths.DETECTIONS, paths.TRACKS, paths.BEARINGS, paths.TAG_OUTLI
 """Marks that belong on the image and not into the scene."""
 
 
-def make_blueprint(setup: EpisodeSetup) -> rrb.Blueprint:
+def make_blueprint(setup: EpisodeSetup, part: StationPart) -> rrb.Blueprint:
     """3-D scene on the left; the camera at the top right, plots and the pilot's modes below it."""
-    landing = isinstance(setup.station, LandingStationCfg)
     return rrb.Blueprint(
         rrb.Horizontal(
-            _scene(setup),
-            rrb.Vertical(_camera(), _plots(setup), _modes(landing), row_shares=[5, 4, 3]),
+            _scene(setup, part),
+            rrb.Vertical(_camera(), _plots(part), _modes(part), row_shares=[5, 4, 3]),
             column_shares=[1, 1],
         ),
         rrb.TimePanel(state="collapsed", timeline=paths.SIM_TIME),
@@ -37,7 +35,7 @@ def make_blueprint(setup: EpisodeSetup) -> rrb.Blueprint:
     )
 
 
-def _scene(setup: EpisodeSetup) -> rrb.Spatial3DView:
+def _scene(setup: EpisodeSetup, part: StationPart) -> rrb.Spatial3DView:
     # Path and estimates are logged piece by piece: only "everything up to now" makes them a line and a cloud.
     until_now = rrb.VisibleTimeRanges(
         [
@@ -48,23 +46,15 @@ def _scene(setup: EpisodeSetup) -> rrb.Spatial3DView:
         ]
     )
     x, y, z = (float(part) for part in setup.T_world_station[:3, 3])
-    eye, target = (x + 10.0, y + 17.0, z + 6.5), (x + 6.5, y, z)
-    if isinstance(setup.station, LandingStationCfg):
-        eye, target = (x - 4.0, y - 6.5, z + 3.5), (x, y, z + 2.0)
+    eye, target = part.eye((x, y, z))
     return rrb.Spatial3DView(
         name="Scene",
         origin=paths.WORLD,
-        contents=[
-            "+ $origin/**",
-            f"- {paths.DETECTIONS}",
-            f"- {paths.TRACKS}",
-            f"- {paths.BEARINGS}",
-            f"- {paths.TAG_OUTLINE}",
-        ],
+        contents=["+ $origin/**", *(f"- {path}" for path in _ON_THE_IMAGE)],
         background=[12, 26, 40],
         line_grid=rrb.LineGrid3D(
             plane=rr.components.Plane3D.XY.with_distance(z - setup.station.floor_below_m),
-            spacing=1.0 if isinstance(setup.station, LandingStationCfg) else 5.0,
+            spacing=part.grid_m,
             color=[90, 120, 140, 60],
         ),
         eye_controls=rrb.EyeControls3D(position=eye, look_target=target),
@@ -76,41 +66,29 @@ def _camera() -> rrb.Spatial2DView:
     return rrb.Spatial2DView(name="Camera", origin=paths.CAMERA, background=[0, 0, 0])
 
 
-def _plot(name: str, path: str) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(name=name, origin=path, plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop))
-
-
-def _plots(setup: EpisodeSetup) -> rrb.Tabs:
-    first: list[rrb.Vertical] = []
-    if beacon_of(setup) is not None:
-        first.append(rotating_views())
-    if isinstance(setup.station, LandingStationCfg):
-        place = (_plot("Seat from its place, m", paths.PLACE), _plot("Heading error, deg", paths.PLACE_ANGLE))
-        first.append(rrb.Vertical(*place, name="Place"))
+def _plots(part: StationPart) -> rrb.Tabs:
     return rrb.Tabs(
-        *first,
+        *part.views(),
         rrb.Vertical(
-            _plot("Pose error against truth, m", paths.POSE_ERROR),
-            _plot("Pose error against truth, deg", paths.POSE_ANGLE),
+            plot("Pose error against truth, m", paths.POSE_ERROR),
+            plot("Pose error against truth, deg", paths.POSE_ANGLE),
             name="Pose error",
         ),
-        rrb.Vertical(_plot("Range", paths.RANGE), _plot("Speed", paths.SPEED), name="Motion"),
-        _plot("Commands", paths.COMMANDS),
-        rrb.Vertical(_plot("Current", paths.CURRENT), _plot("Contact", paths.CONTACT), name="Water and contact"),
+        rrb.Vertical(plot("Range", paths.RANGE), plot("Speed", paths.SPEED), name="Motion"),
+        plot("Commands", paths.COMMANDS),
+        rrb.Vertical(plot("Current", paths.CURRENT), plot("Contact", paths.CONTACT), name="Water and contact"),
         rrb.Vertical(
-            _plot("Lights", paths.LIGHT_COUNTS), _plot("Reprojection error", paths.REPROJECTION), name="Perception"
+            plot("Lights", paths.LIGHT_COUNTS), plot("Reprojection error", paths.REPROJECTION), name="Perception"
         ),
         active_tab=0,
     )
 
 
-def _modes(landing: bool) -> rrb.Tabs:
-    lanes = [rrb.StateTimelineView(name="Mode", origin=paths.MODE_STATE)]
-    if landing:
-        lanes.append(rrb.StateTimelineView(name="Level", origin=paths.LEVEL_STATE))
+def _modes(part: StationPart) -> rrb.Tabs:
+    lanes = [rrb.StateTimelineView(name="Mode", origin=paths.MODE_STATE), *part.lanes()]
     return rrb.Tabs(
         rrb.Horizontal(
-            rrb.Vertical(*lanes) if landing else lanes[0],
+            rrb.Vertical(*lanes) if len(lanes) > 1 else lanes[0],
             rrb.TextLogView(
                 name="Mode changes",
                 origin=paths.MODE_LOG,
@@ -118,7 +96,7 @@ def _modes(landing: bool) -> rrb.Tabs:
             ),
             name="Mode",
         ),
-        _plot("Mode number", paths.MODE_NUMBER),
+        plot("Mode number", paths.MODE_NUMBER),
         rrb.TextDocumentView(name="Episode", origin=paths.SUMMARY),
         active_tab=0,
     )

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import rerun as rr
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
@@ -26,6 +27,15 @@ class Mesh:
     vertices_m: Array
     normals: Array
     triangles: NDArray[np.uint32]
+
+    def shown(self, colour: int) -> rr.Mesh3D:
+        """The mesh as Rerun shows it, in one colour."""
+        return rr.Mesh3D(
+            vertex_positions=self.vertices_m,
+            vertex_normals=self.normals,
+            triangle_indices=self.triangles,
+            albedo_factor=colour,
+        )
 
 
 def frustum(

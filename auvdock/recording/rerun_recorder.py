@@ -18,6 +18,7 @@ from auvdock.recording import paths
 from auvdock.recording.columns import ColumnWriter, Row
 from auvdock.recording.file import RecordingFile
 from auvdock.recording.layout import make_blueprint
+from auvdock.recording.parts import part_of
 from auvdock.recording.scene import log_scene
 from auvdock.recording.summary import result_document, unfinished_document
 
@@ -92,11 +93,12 @@ class RerunRecorder:
         except OSError as error:
             raise _unwritable(self.path, error) from error
         stream.send_recording_name(setup.title)
-        stream.send_blueprint(make_blueprint(setup))
-        log_scene(stream, setup)
+        part = part_of(setup)
+        stream.send_blueprint(make_blueprint(setup, part))
+        log_scene(stream, setup, part)
         _log_document(stream, unfinished_document(setup))
         self._file.flush()
-        self._setup, self._stream, self._writer = setup, stream, ColumnWriter(stream, setup)
+        self._setup, self._stream, self._writer = setup, stream, ColumnWriter(stream, setup, part)
         self._frame = self._images = 0
 
     def on_tick(self, tick: Tick) -> None:

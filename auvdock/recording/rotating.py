@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from auvdock.core.arrays import Array, BoolArray, IntArray
-from auvdock.core.rotating_beacon import RotatingBeaconCfg
+from auvdock.core.arrays import Array
+from auvdock.core.station import ConicalStationCfg
 from auvdock.recording import paths
+from auvdock.recording.batch import Batch
+from auvdock.recording.conical import ConicalPart
 from auvdock.recording.meshes import beam_cone
 from auvdock.recording.palette import rgba, wavelength_rgb
+from auvdock.recording.part import plot
 
 if TYPE_CHECKING:
     from auvdock.episode.trace import EpisodeSetup, Tick
 
-__all__ = ["beacon_of", "log_rotating_scene", "rotating_views", "write_rotating"]
+__all__ = ["RotatingPart"]
 
 _BEAM_M = 20.0
 _SHOWN_SIGMAS = 2.0
@@ -31,78 +34,62 @@ _SERIES = {
 }
 
 
-class Batch(Protocol):
-    """The recorder's stream at the times of some rows."""
+class RotatingPart(ConicalPart):
+    """A conical station with a beam that turns above it."""
 
-    def select(self, index: IntArray) -> Batch:
-        """Only some rows."""
-        ...
+    def __init__(self, setup: EpisodeSetup, station: ConicalStationCfg) -> None:
+        """Begin an episode.
 
-    def send(self, path: str, columns: Iterable[rr.ComponentColumn]) -> None:
-        """One row of each column per time."""
-        ...
+        Raises:
+            ValueError: the station carries no rotating beacon.
+        """
+        super().__init__(setup, station)
+        if station.rotating is None:
+            raise ValueError("a station without a rotating beacon")
+        self._beacon = station.rotating
 
-    def scalars(self, path: str, values: Array, present: BoolArray | None = None) -> None:
-        """One or several series."""
-        ...
-
-
-def beacon_of(setup: EpisodeSetup) -> RotatingBeaconCfg | None:
-    """The station's rotating beacon, None without."""
-    return getattr(setup.station, "rotating", None)
-
-
-def log_rotating_scene(stream: rr.RecordingStream, beacon: RotatingBeaconCfg) -> None:
-    """What stays the same: the beam's cone in the beam's own frame, names and colours of the plots."""
-    colour = wavelength_rgb(beacon.wavelength_nm)
-    elevation = math.radians(beacon.elevation_deg)
-    axis = np.array([math.cos(elevation), 0.0, math.sin(elevation)])
-    cone = beam_cone(np.zeros(3), axis, beacon.divergence_deg, _BEAM_M)
-    mesh = rr.Mesh3D(
-        vertex_positions=cone.vertices_m,
-        vertex_normals=cone.normals,
-        triangle_indices=cone.triangles,
-        albedo_factor=rgba(*colour, 40),
-    )
-    stream.log(f"{paths.ROTATING_BEAM}/cone", mesh, static=True, strict=True)
-    stream.log(
-        paths.BELIEVED,
-        rr.Ellipsoids3D.from_fields(colors=[rgba(255, 220, 80, 90)], fill_mode=rr.components.FillMode.Solid),
-        static=True,
-        strict=True,
-    )
-    for path, (name, line) in _SERIES.items():
-        look = (
-            rr.SeriesPoints(names=[name], colors=[line], marker_sizes=[4.0])
-            if path == paths.AZIMUTH_FIX
-            else rr.SeriesLines(names=[name], colors=[line])
+    def log_scene(self, stream: rr.RecordingStream) -> None:
+        """Log funnel and tube, the beam's cone in the beam's own frame, names and colours of the plots."""
+        super().log_scene(stream)
+        beacon = self._beacon
+        elevation = math.radians(beacon.elevation_deg)
+        axis = np.array([math.cos(elevation), 0.0, math.sin(elevation)])
+        cone = beam_cone(np.zeros(3), axis, beacon.divergence_deg, _BEAM_M)
+        mesh = cone.shown(rgba(*wavelength_rgb(beacon.wavelength_nm), 40))
+        stream.log(f"{paths.ROTATING_BEAM}/cone", mesh, static=True, strict=True)
+        stream.log(
+            paths.BELIEVED,
+            rr.Ellipsoids3D.from_fields(colors=[rgba(255, 220, 80, 90)], fill_mode=rr.components.FillMode.Solid),
+            static=True,
+            strict=True,
         )
-        stream.log(path, look, static=True, strict=True)
+        for path, (name, line) in _SERIES.items():
+            look = (
+                rr.SeriesPoints(names=[name], colors=[line], marker_sizes=[4.0])
+                if path == paths.AZIMUTH_FIX
+                else rr.SeriesLines(names=[name], colors=[line])
+            )
+            stream.log(path, look, static=True, strict=True)
 
+    def views(self) -> list[rrb.Vertical]:
+        """Azimuth and range."""
+        azimuth, sigma = plot("Azimuth", paths.AZIMUTH), plot("Range uncertainty", paths.RANGE_SIGMA)
+        return [rrb.Vertical(azimuth, sigma, name="Rotating beacon")]
 
-def write_rotating(batch: Batch, ticks: Sequence[Tick], setup: EpisodeSetup, T_station_camera: Array) -> None:
-    """What changes: the beam by the vehicle's clock, true, believed and measured azimuth, the believed place.
-
-    Args:
-        batch: the rows' times.
-        ticks: the rows.
-        setup: the episode.
-        T_station_camera: (n, 4, 4) true poses of the camera.
-    """
-    beacon = beacon_of(setup)
-    if beacon is None:
-        return
-    x, y, _ = beacon.position_m
-    turned = np.array([beacon.azimuth_rad(tick.truth.time_s) for tick in ticks])
-    place = np.broadcast_to(np.array(beacon.position_m), (len(ticks), 3))
-    batch.send(paths.ROTATING_BEAM, rr.Transform3D.columns(translation=place, mat3x3=_about_z(turned)))
-    camera = T_station_camera[:, :3, 3]
-    batch.scalars(paths.AZIMUTH_TRUE, np.degrees(np.arctan2(camera[:, 1] - y, camera[:, 0] - x)))
-    fixes = [(row, tick.percept.azimuth) for row, tick in enumerate(ticks) if tick.percept and tick.percept.azimuth]
-    if fixes:
-        at = batch.select(np.array([row for row, _ in fixes]))
-        at.scalars(paths.AZIMUTH_FIX, np.degrees([fix.azimuth_rad for _, fix in fixes]))
-    _write_believed(batch, ticks, setup, camera)
+    def write(self, batch: Batch, ticks: Sequence[Tick], T_station_camera: Array) -> None:
+        """Write the beam by the vehicle's clock, true, believed and measured azimuth, the believed place."""
+        beacon = self._beacon
+        x, y, _ = beacon.position_m
+        turned = np.array([beacon.azimuth_rad(tick.truth.time_s) for tick in ticks])
+        place = np.broadcast_to(np.array(beacon.position_m), (len(ticks), 3))
+        batch.send(paths.ROTATING_BEAM, rr.Transform3D.columns(translation=place, mat3x3=_about_z(turned)))
+        camera = T_station_camera[:, :3, 3]
+        batch.scalars(paths.AZIMUTH_TRUE, np.degrees(np.arctan2(camera[:, 1] - y, camera[:, 0] - x)))
+        fixes = [(row, tick.percept.azimuth) for row, tick in enumerate(ticks) if tick.percept and tick.percept.azimuth]
+        if fixes:
+            at = batch.select(np.array([row for row, _ in fixes]))
+            at.scalars(paths.AZIMUTH_FIX, np.degrees([fix.azimuth_rad for _, fix in fixes]))
+        _write_believed(batch, ticks, self._setup, camera)
 
 
 def _write_believed(batch: Batch, ticks: Sequence[Tick], setup: EpisodeSetup, camera: Array) -> None:
@@ -123,16 +110,6 @@ def _write_believed(batch: Batch, ticks: Sequence[Tick], setup: EpisodeSetup, ca
     at.send(paths.BELIEVED, rr.Ellipsoids3D.columns(centers=world, half_sizes=half, quaternions=turns))
     at.scalars(paths.AZIMUTH_BELIEVED, np.degrees(azimuth))
     at.scalars(paths.RANGE_SIGMA, along)
-
-
-def rotating_views() -> rrb.Vertical:
-    """The blueprint's tab for the rotating beacon."""
-    legend = rrb.PlotLegend(corner=rrb.Corner2D.LeftTop)
-    return rrb.Vertical(
-        rrb.TimeSeriesView(name="Azimuth", origin=paths.AZIMUTH, plot_legend=legend),
-        rrb.TimeSeriesView(name="Range uncertainty", origin=paths.RANGE_SIGMA, plot_legend=legend),
-        name="Rotating beacon",
-    )
 
 
 def _about_z(angle_rad: Array) -> Array:

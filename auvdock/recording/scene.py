@@ -8,25 +8,21 @@ import numpy as np
 import rerun as rr
 
 from auvdock.core.camera import Camera
-from auvdock.core.landing_station import LandingStationCfg
-from auvdock.core.stations import StationCfg
 from auvdock.recording import paths
 from auvdock.recording.hull import hull_shapes
-from auvdock.recording.landing_scene import log_landing, plots_of
-from auvdock.recording.meshes import Mesh, beam_cone, frustum
-from auvdock.recording.modes import KNOWN_MODES, LANDING_COLOURS, LANDING_MODES, MODE_COLOURS
+from auvdock.recording.meshes import beam_cone
+from auvdock.recording.modes import KNOWN_MODES, MODE_COLOURS
 from auvdock.recording.palette import rgba, wavelength_rgb
-from auvdock.recording.rotating import beacon_of, log_rotating_scene
 
 if TYPE_CHECKING:
     from auvdock.core.beacons import BeaconLayout
     from auvdock.episode.trace import EpisodeSetup
+    from auvdock.recording.part import Series, StationPart
 
 __all__ = ["log_scene"]
 
 _BEAM_LENGTH_M = 3.0
-_OUTWARDS = np.array([1.0, 0.0, 0.0])
-_PLOTS: dict[str, tuple[tuple[str, int], ...]] = {
+_PLOTS: dict[str, Series] = {
     paths.POSE_ERROR: (
         ("lateral, m", rgba(255, 120, 90)),
         ("vertical, m", rgba(110, 220, 130)),
@@ -53,7 +49,7 @@ _PLOTS: dict[str, tuple[tuple[str, int], ...]] = {
 }
 
 
-def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
+def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup, part: StationPart) -> None:
     """Log everything static, once."""
 
     def static(path: str, *what: rr.AsComponents) -> None:
@@ -61,16 +57,10 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
 
     static(paths.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     static(paths.STATION, _transform(setup.T_world_station))
-    for path, mesh in _station_meshes(setup.station).items():
-        static(path, _mesh3d(mesh, rgba(200, 205, 210, 110)))
     _log_lights(stream, setup.station.layout)
-    beacon = beacon_of(setup)
-    if beacon is not None:
-        log_rotating_scene(stream, beacon)
+    part.log_scene(stream)
     for path, shape in hull_shapes(setup.vehicle).items():
         static(path, shape)
-    if isinstance(setup.station, LandingStationCfg):
-        log_landing(stream, setup.station)
     static(paths.CAMERA, _transform(setup.camera.T_body_camera), _pinhole(setup.camera))
     static(paths.PATH, rr.LineStrips3D.from_fields(colors=[rgba(255, 220, 80)], radii=[-1.5]))
     static(paths.ESTIMATES, rr.Points3D.from_fields(colors=[rgba(255, 90, 200)], radii=[-1.5]))
@@ -82,7 +72,7 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
         rr.Points2D.from_fields(radii=[-5.0], colors=[rgba(255, 255, 255, 160)], show_labels=True),
     )
     actuators = tuple((name, 0) for name in setup.vehicle.actuator_names)
-    for path, series in {**_PLOTS, **plots_of(setup.station), paths.COMMANDS: actuators}.items():
+    for path, series in {**_PLOTS, **part.plots, paths.COMMANDS: actuators}.items():
         names = [name for name, _ in series]
         # Actuators have no colours of their own: the viewer's palette tells any number of them apart.
         colours = np.array([colour for _, colour in series if colour], dtype=np.uint32)
@@ -93,35 +83,14 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup) -> None:
     static(
         paths.MODE_STATE,
         rr.StateConfiguration(
-            values=[*KNOWN_MODES, *LANDING_MODES], colors=np.array([*MODE_COLOURS, *LANDING_COLOURS], dtype=np.uint32)
+            values=[*KNOWN_MODES, *part.modes],
+            colors=np.array([*MODE_COLOURS, *part.modes.values()], dtype=np.uint32),
         ),
     )
 
 
 def _transform(transform: np.ndarray) -> rr.Transform3D:
     return rr.Transform3D(translation=transform[:3, 3], mat3x3=transform[:3, :3])
-
-
-def _mesh3d(mesh: Mesh, colour: int) -> rr.Mesh3D:
-    return rr.Mesh3D(
-        vertex_positions=mesh.vertices_m,
-        vertex_normals=mesh.normals,
-        triangle_indices=mesh.triangles,
-        albedo_factor=colour,
-    )
-
-
-def _station_meshes(station: StationCfg) -> dict[str, Mesh]:
-    if isinstance(station, LandingStationCfg):
-        return {}
-    funnel = station.funnel
-    throat = np.array([-funnel.length_m, 0.0, 0.0])
-    return {
-        paths.FUNNEL: frustum(
-            np.zeros(3), -_OUTWARDS, funnel.length_m, funnel.mouth_radius_m, funnel.tube_radius_m, 48
-        ),
-        paths.TUBE: frustum(throat, -_OUTWARDS, funnel.tube_length_m, funnel.tube_radius_m, funnel.tube_radius_m),
-    }
 
 
 def _log_lights(stream: rr.RecordingStream, layout: BeaconLayout) -> None:
@@ -141,7 +110,7 @@ def _log_lights(stream: rr.RecordingStream, layout: BeaconLayout) -> None:
     for beacon, position_m, axis, colour in zip(layout.beacons, layout.positions_m, layout.axes, colours, strict=True):
         stream.log(
             f"{paths.BEAMS}/{rr.escape_entity_path_part(beacon.name)}",
-            _mesh3d(beam_cone(position_m, axis, beacon.beam_angle_deg, _BEAM_LENGTH_M), rgba(*colour, 18)),
+            beam_cone(position_m, axis, beacon.beam_angle_deg, _BEAM_LENGTH_M).shown(rgba(*colour, 18)),
             static=True,
             strict=True,
         )

@@ -10,10 +10,10 @@ import time
 
 import pytest
 
-from auvdock.campaign.config import STATIONS
 from auvdock.campaign.report.page import recording_path, replay_command
 from auvdock.campaign.store import read_table
 from auvdock.cli.main import main
+from auvdock.episode.stations import STATIONS
 
 FLAGS = [
     *("--station", "conical", "--fidelity", "beacons", "--current", "0:0.4:2", "--attenuation", "0.2,0.8"),

@@ -6,13 +6,14 @@ import pytest
 
 from auvdock.campaign.axes import AxisCfg
 from auvdock.campaign.axis_text import parse_axis
-from auvdock.campaign.config import STATIONS, CampaignCfg
+from auvdock.campaign.config import CampaignCfg
 from auvdock.campaign.plan import Plan
 from auvdock.campaign.store import read_table
 from auvdock.cli.main import main
 from auvdock.core.errors import ConfigError
 from auvdock.episode.config import LandingEpisodeCfg, level_cfg
 from auvdock.episode.runner import EpisodeRunner
+from auvdock.episode.stations import STATIONS
 
 SHORT = {"world": {"fidelity": "beacons", "limits": {"max_time_s": 2.0}}}
 AHEAD = "campaign_pilots:Ahead"
@@ -69,4 +70,4 @@ def test_campaigns_of_every_station_can_be_planned(station):
     assert [cfg.world.sim.current.speed_m_s for cfg in configs] == [0.0, 0.0, 0.2, 0.2]
     assert {cfg.world.attenuation_per_m for cfg in configs} == {0.3}
     assert isinstance(configs[0], LandingEpisodeCfg) == (station == "landing")
-    assert STATIONS[station](0).world.station == configs[0].world.station
+    assert STATIONS[station].level(0).world.station == configs[0].world.station

@@ -88,20 +88,20 @@ def test_doctor_tells_of_an_unusable_mujoco_gl(monkeypatch):
 
 def test_doctor_tells_the_truth_of_kept_code(tmp_path, monkeypatch):
     monkeypatch.setattr(doctor, "cache_folders", lambda value: (tmp_path,) if value is doctor.examine else ())
-    check = doctor._compiled_loops()
+    check = doctor.compiled_loops()
     assert check.ok
     assert "none kept yet" in check.detail
     body = bytes(64)
     whole = tmp_path / f"module.function.{sys.implementation.cache_tag}-0123.nbc"
     whole.write_bytes(hashlib.sha256(body).digest() + body)
-    assert doctor._compiled_loops().detail == f"1 kept under {tmp_path}"
+    assert doctor.compiled_loops().detail == f"1 kept under {tmp_path}"
     whole.with_stem(f"{whole.stem}4").write_bytes(b"")
-    check = doctor._compiled_loops()
+    check = doctor.compiled_loops()
     assert not check.ok
     assert f"1 damaged in {tmp_path}" in check.detail
     (tmp_path / "file").touch()  # no folder can be made there, by nobody
     monkeypatch.setattr(doctor, "cache_folders", lambda value: (tmp_path / "file",) if value is doctor.examine else ())
-    check = doctor._compiled_loops()
+    check = doctor.compiled_loops()
     assert not check.ok
     assert "nothing more can be kept" in check.detail
     assert "NUMBA_CACHE_DIR" in check.remedy
@@ -111,7 +111,7 @@ def test_doctor_takes_full_folders_that_cannot_be_written(tmp_path, monkeypatch)
     monkeypatch.setattr(doctor, "cache_folders", lambda value: (tmp_path,) if value is doctor.examine else ())
     for state, ok in ((FolderState(5, 0, "Read-only file system"), True), (FolderState(0, 0, "No space"), False)):
         monkeypatch.setattr(doctor, "examine_folder", lambda folder, state=state: state)
-        check = doctor._compiled_loops()
+        check = doctor.compiled_loops()
         assert check.ok is ok
         assert state.unwritable is not None
         assert state.unwritable in check.detail

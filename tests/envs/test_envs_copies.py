@@ -48,14 +48,14 @@ class Flight:
     def __init__(self, cfg: AnyEpisodeCfg) -> None:
         self.runner = EpisodeRunner(cfg)
         self.runner.world.reset(1)
-        self.runner.task.reset()
+        self.runner.perceiver.reset()
         self.state = self.runner.pilot.initial_state()
         self.last: Any = None
 
     def go(self) -> Any:
         world = self.runner.world
         sensed = world.sense()
-        percept = self.runner.perceive(sensed)
+        percept = self.runner.perceiver.perceive(sensed)
         command, self.state = self.runner.pilot.step(self.state, percept, sensed.proprioception)
         world.step(command.values)
         self.last = sensed, percept, command, world.truth
@@ -112,7 +112,7 @@ def test_the_walk_sees_views_that_were_separated() -> None:
     assert sharing(walk(torn)) == set()
 
 
-def near_env(kind: str, observation: str) -> VehicleEnv:
+def near_env(kind: str, observation: str) -> VehicleEnv[Any, Any, Any]:
     fidelity = "pixels" if observation == "image" else "beacons"
     if kind == "landing":
         start = LandingStartCfg(max_height_m=4.0)

@@ -1,82 +1,19 @@
-"""The rotating beacon's world and environment: starts, unknown heading, lost frames, clock, Gymnasium's contract."""
+"""The rotating beacon's world and environment: starts, unknown heading, lost frames, clock."""
 
 import dataclasses
 import math
-import pickle
-from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 
 from auvdock.core.beacons import BeaconCfg
-from auvdock.core.camera import CameraCfg
 from auvdock.core.errors import ConfigError
 from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.transforms import euler_zyx_from_rotation
 from auvdock.envs.config import StartCfg, WorldCfg, rotating_world_cfg
-from auvdock.envs.rotating_docking import RotatingDockingEnv
 from auvdock.envs.world import DockingWorld, draw_start
 
 BEACONS = dataclasses.replace(rotating_world_cfg(), fidelity="beacons")
-NAME = "auvdock/RotatingBeaconDocking-v0"
-
-
-def rollout(env, seed, steps):
-    actions = np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, *env.action_space.shape))
-    trace: list[Any] = [env.reset(seed=seed)]
-    trace += [env.step(action) for action in actions.astype(np.float32)]
-    return trace
-
-
-def flatten(item):
-    if isinstance(item, dict):
-        return [leaf for key in sorted(item) for leaf in flatten(item[key])]
-    if isinstance(item, list | tuple):
-        return [leaf for part in item for leaf in flatten(part)]
-    return [item]
-
-
-def assert_equal(first, second):
-    for one, other in zip(flatten(first), flatten(second), strict=True):
-        assert np.array_equal(one, other), (one, other)
-
-
-@pytest.mark.filterwarnings("error::UserWarning")
-@pytest.mark.parametrize("observation", ["state", "pose"])
-def test_environment_checker_is_content(observation):
-    env = gymnasium.make(NAME, observation=observation)
-    check_env(env.unwrapped, skip_render_check=True)
-
-
-@pytest.mark.render
-@pytest.mark.filterwarnings("error::UserWarning")
-def test_environment_checker_is_content_with_images():
-    cfg = dataclasses.replace(rotating_world_cfg(), camera=CameraCfg(width_px=160, height_px=90))
-    options: dict[str, Any] = {"cfg": cfg, "observation": "image", "fidelity": "pixels", "render_mode": "rgb_array"}
-    env = gymnasium.make(NAME, **options)
-    check_env(env.unwrapped)
-    env.close()
-
-
-def test_same_seed_same_rollout_fresh_used_or_pickled():
-    env = RotatingDockingEnv(observation="pose")
-    rollout(env, 1, 10)
-    copy = pickle.loads(pickle.dumps(env))
-    first = rollout(env, 3, 25)
-    assert_equal(first, rollout(RotatingDockingEnv(observation="pose"), 3, 25))
-    assert_equal(first, rollout(copy, 3, 25))
-
-
-def test_vector_environments():
-    for mode in ("sync", "async"):
-        vector = gymnasium.make_vec(NAME, num_envs=2, vectorization_mode=mode)
-        observations, _ = vector.reset(seed=0)
-        assert observations.shape == (2, 19)
-        assert not np.array_equal(observations[0], observations[1])
-        vector.step(np.zeros((2, 7), dtype=np.float32))
-        vector.close()
 
 
 def test_starts_fill_the_ring_with_any_heading():

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
@@ -11,7 +12,7 @@ from auvdock.envs.config import StartCfg, WorldCfg
 from auvdock.envs.docking import DockingEnv
 from auvdock.envs.landing import LandingEnv
 from auvdock.envs.landing_config import LandingWorldCfg
-from auvdock.envs.rotating_docking import RotatingDockingEnv
+from auvdock.envs.registration import ENVIRONMENTS
 from auvdock.envs.wrappers import BodyWrenchAction, SetPointAction
 from auvdock.sim.simulator import SimCfg
 
@@ -26,11 +27,10 @@ def fly(env, action, seconds):
 
 
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")  # it is: that is what is checked here
-@pytest.mark.parametrize(
-    ("wrapper", "make"), [(BodyWrenchAction, DockingEnv), (SetPointAction, DockingEnv), (SetPointAction, LandingEnv)]
-)
-def test_environment_checker_is_content(wrapper, make):
-    check_env(wrapper(make()), skip_render_check=True)
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+@pytest.mark.parametrize("wrapper", [BodyWrenchAction, SetPointAction])
+def test_environment_checker_is_content(wrapper, name):
+    check_env(wrapper(gymnasium.make(name).unwrapped), skip_render_check=True)
 
 
 @pytest.mark.parametrize(("axis", "component"), [(0, 0), (1, 1), (2, 2), (3, 4), (4, 5)])
@@ -76,11 +76,11 @@ def test_whatever_a_landing_wrapper_is_told_stays_within_the_actuators(wrapper, 
 BARE = {"none": lambda env: env, "wrench": BodyWrenchAction, "set_point": SetPointAction}
 
 
-@pytest.mark.parametrize("make", [DockingEnv, LandingEnv, RotatingDockingEnv])
-@pytest.mark.parametrize("name", BARE)
-def test_an_action_that_is_none_is_refused_and_leaves_no_trace(make: Any, name: str) -> None:
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+@pytest.mark.parametrize("wrapper", BARE)
+def test_an_action_that_is_none_is_refused_and_leaves_no_trace(name: str, wrapper: str) -> None:
     """Refused actions between the steps of an episode change nothing in it."""
-    env: Any = BARE[name](make())
+    env: Any = BARE[wrapper](gymnasium.make(name).unwrapped)
     n = env.action_space.shape[0]
     action = np.full(n, 0.3, dtype=np.float32)
     wrong = [(np.where(np.arange(n) == k, np.nan, action), f"action {k} is not a number") for k in (0, n - 1)]
@@ -106,7 +106,5 @@ def test_a_step_before_reset_is_refused(wrapper):
 
 
 def test_only_docking_environments_can_be_wrapped():
-    import gymnasium
-
     with pytest.raises(TypeError, match="no docking environment"):
         BodyWrenchAction(gymnasium.make("CartPole-v1"))

@@ -21,14 +21,15 @@ from hypothesis import strategies as st
 
 import auvdock
 from auvdock.campaign.axes import nested
-from auvdock.campaign.config import STATIONS, CampaignCfg, campaign_from_plain
+from auvdock.campaign.config import CampaignCfg, campaign_from_plain
 from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 from auvdock.core.reader import bare_type, hints_of
 from auvdock.core.strict import from_mapping, setting_type, to_plain
 from auvdock.episode.config import AnyEpisodeCfg
+from auvdock.episode.stations import STATIONS
 
-BASES: Mapping[str, AnyEpisodeCfg] = {station: make(1) for station, make in STATIONS.items()}
+BASES: Mapping[str, AnyEpisodeCfg] = {station: kind.level(1) for station, kind in STATIONS.items()}
 
 
 def tables(cls: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import auvdock
-from auvdock.cli.dock_flags import _working_fidelity
+from auvdock.cli.dock_flags import working_fidelity
 from auvdock.cli.doctor import _open_gl, _try
 from auvdock.core.errors import GraphicsError
 from auvdock.envs.chase import ChaseCamera
@@ -185,7 +185,7 @@ def no_context(monkeypatch):
 def test_a_context_that_is_none_is_no_context(no_context, capsys):
     with pytest.raises(GraphicsError, match="contextless"):
         probe_gl()
-    assert _working_fidelity() == "beacons"
+    assert working_fidelity() == "beacons"
     assert capsys.readouterr().err.count("\n") == 1
     check = _try("OpenGL", False, _open_gl)
     assert not check.ok

@@ -34,6 +34,7 @@ def make_setup(width_px: int = 640, height_px: int = 360) -> EpisodeSetup:
     )
     return EpisodeSetup(
         title="synthetic approach",
+        kind="conical",
         station=station,
         vehicle=vehicle,
         camera=camera,

@@ -189,10 +189,11 @@ def test_pinhole_projects_the_optical_axis_to_the_image_centre(recording: Record
 
 def test_result_is_a_table(recording: Recording) -> None:
     (text,) = recording.static(paths.SUMMARY, "TextDocument:text")
-    assert "| Outcome | **docked** |" in text
-    assert "| Distortion rate | 4.1 % (10 of 242 frames) |" in text
-    assert "| Vertical error at the throat | – |" in text
-    assert "| Heading error at the throat | 3.0 ° |" in text
+    assert "| outcome | **docked** |" in text
+    assert "| distortion rate | 4.13 % |" in text
+    assert "| invalid frames | 10 |" in text
+    assert "| vertical error at entry | - |" in text
+    assert "| heading error at entry | 3.0° |" in text
 
 
 def test_the_blueprint_shows_only_what_was_recorded(recording: Recording) -> None:

@@ -21,7 +21,7 @@ COUNT = 60
 
 def flown(path: Path, name: str) -> Recording:
     """An approach of 60 periods, with a fix in every twentieth and a believed place in the first half."""
-    setup = dataclasses.replace(make_setup(160, 90), station=load_conical_station(name))
+    setup = dataclasses.replace(make_setup(160, 90), kind=name, station=load_conical_station(name))
     recorder = RerunRecorder(path)
     recorder.on_start(setup)
     believed = {"station_x_m": 9.0, "station_y_m": 2.0, "range_sigma_m": 3.0, "cross_sigma_m": 0.5, "azimuth_rad": 0.2}

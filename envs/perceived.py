@@ -1,0 +1,45 @@
+"""Worlds together with what perceives them, made alike for environments and for episodes."""
+
+from __future__ import annotations
+
+from auvdock.core.errors import located
+from auvdock.envs.config import WorldCfg
+from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.envs.landing_world import LandingWorld
+from auvdock.envs.world import DockingWorld
+from auvdock.perception.detectors import make_detector, make_station_detector
+from auvdock.perception.landing.config import LandingPerceptionCfg
+from auvdock.perception.landing.pipeline import LandingPerception
+from auvdock.perception.landing.tag_detectors import make_tag_detector
+from auvdock.perception.perceiver import BeaconPerceiver, LandingPerceiver
+from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
+
+__all__ = ["perceived_docking", "perceived_landing"]
+
+
+def perceived_docking(cfg: WorldCfg, perception: PerceptionCfg) -> tuple[DockingWorld, BeaconPerceiver]:
+    """The world of docking into a funnel, with or without a rotating beacon, and what perceives its lights.
+
+    Raises:
+        ConfigError: a name that does not exist or a value that does not fit.
+    """
+    station = cfg.station
+    with located("perception."):  # before the world, whose loops may have to be compiled
+        detector = make_station_detector(perception.detector, station)
+    world = DockingWorld(cfg, perception.detector)
+    surveyed = cfg.station_heading == "surveyed"
+    lights = BeaconPerception(perception, world.camera, station.layout, station.rotating, heading_surveyed=surveyed)
+    return world, BeaconPerceiver(detector, lights)
+
+
+def perceived_landing(cfg: LandingWorldCfg, perception: LandingPerceptionCfg) -> tuple[LandingWorld, LandingPerceiver]:
+    """The world of landing and what perceives its lights and its tag.
+
+    Raises:
+        ConfigError: a name that does not exist or a value that does not fit.
+    """
+    with located("perception."):
+        detector = make_detector(perception.detector)
+        tag_detector = make_tag_detector(perception.tag_detector, (cfg.station.tag.tag_id,))
+    world = LandingWorld(cfg, perception.detector, perception.tag_detector)
+    return world, LandingPerceiver(detector, tag_detector, LandingPerception(perception, world.camera, cfg.station))
