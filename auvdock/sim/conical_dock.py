@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from auvdock.core.arrays import Array
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.vehicle import VehicleCfg
@@ -30,7 +32,7 @@ class ConicalDock:
         self._reach_m = vehicle.nose_x_m
         self._latch = Latch(station.latch, station.funnel)
         # The latch looks at a nose behind the throat only; the station frame is not turned against the world.
-        self.watch = Watch(self._reach_m, (1.0, 0.0, 0.0), -station.funnel.length_m)
+        self.watch = Watch(self._reach_m, np.array([1.0, 0.0, 0.0]), -station.funnel.length_m)
         self._nose_m = (math.inf, 0.0, 0.0)
         self._axis_angle_rad = 0.0
 

@@ -39,7 +39,7 @@ class LandingDock:
         self._place_z_m = station.guide.seat_height_m - station.depth_m
         self._latch = LandingLatch(station.latch)
         # Well before anything can touch: the touchdown takes its speed from the step before.
-        self.watch = Watch(0.0, (0.0, 0.0, 1.0), self._place_z_m + _WATCH_M)
+        self.watch = Watch(0.0, np.array([0.0, 0.0, 1.0]), self._place_z_m + _WATCH_M)
         self._last_down_m_s = 0.0
         self._nose_m = (0.0, 0.0, 0.0)
         self._posture = Posture((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
