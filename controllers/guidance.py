@@ -6,36 +6,35 @@ Everything is in approach axes: forward along the approach axis into the funnel,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
 from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.linear_model import hydrodynamic_wrench
 from auvdock.controllers.modes import ModeCfg
-from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.numeric.compiled import compiled
-from auvdock.numeric.scalars import limited
+from auvdock.numeric.records import Record, Records
+from auvdock.numeric.scalars import Vector, limited
 
 __all__ = [
+    "AxisCourse",
+    "AxisLaw",
+    "Course",
     "GuidanceCfg",
+    "Place",
     "approach_speed",
     "axis_course",
     "axis_law",
     "corridor_m",
+    "crab",
     "crab_angle",
-    "crabbed",
     "ilos",
     "sway_reach_m_s",
 ]
-
-# Places in the array that `axis_law` makes.
-_CROSS, _MAX_CROSS, _SIGMA, _CORRIDOR, _CORRIDOR_FROM, _CORRIDOR_SLOPE = 0, 1, 2, 3, 4, 5
-_ENTRY_SPEED, _MID_SPEED, _FAR_SPEED, _FAST_BEYOND, _TUBE_SPEED, _MOUTH, _GATE = 6, 7, 8, 9, 10, 11, 12
-_RUSH_EXCESS, _RUSH_SPEED, _MIN_WAY, _STRAIGHTEN, _STRAIGHT_FROM, _FUNNEL = 13, 14, 15, 16, 17, 18
-_MAX_CRAB, _MAX_ENTRY_CRAB, _VIEW, _REACH, _DT = 19, 20, 21, 22, 23
 
 
 @dataclass(frozen=True)
@@ -105,8 +104,94 @@ class GuidanceCfg:
                 raise ConfigError(name, value, "a value above 0")
 
 
-def axis_law(cfg: GuidanceCfg, modes: ModeCfg, funnel_length_m: float, reach_m_s: float, dt_s: float) -> Array:
-    """What the compiled laws along the axis need, as one array.
+@dataclass(frozen=True)
+class AxisLaw(Record):
+    """What the compiled laws along the axis need; where no unit is told, `GuidanceCfg` explains the name."""
+
+    cross_speed_m_s: float
+    max_cross_speed_m_s: float
+    integral_gain: float
+    corridor_m: float
+    corridor_from_m: float
+    corridor_slope: float
+    entry_speed_m_s: float
+    mid_speed_m_s: float
+    far_speed_m_s: float
+    fast_beyond_m: float
+    tube_speed_m_s: float
+    rush_excess_m_s: float
+    rush_speed_m_s: float
+    min_way_m_s: float
+    straighten_rad_m: float
+    max_crab_rad: float
+    max_entry_crab_rad: float
+    max_view_angle_rad: float
+    mouth_m: float
+    """`ModeCfg.mouth_m`."""
+    gate_m: float
+    """`ModeCfg.gate_distance_m`."""
+    funnel_m: float
+    """From mouth to throat."""
+    straight_from_m: float
+    """Behind the mouth by so much the hull shall be straight."""
+    reach_m_s: float
+    """From `sway_reach_m_s`."""
+    dt_s: float
+    """Control period."""
+
+
+class Place(NamedTuple):
+    """The nose before the mouth in approach axes (forward into the funnel, port, up).
+
+    Attributes:
+        distance_m: before the mouth; negative inside.
+        port_m: to port of the axis.
+        up_m: above the axis.
+        axis_yaw_rad: compass heading of a vehicle that flies straight in.
+        offset_rad: heading relative to that, positive to port.
+        off_axis_m: distance from the axis.
+    """
+
+    distance_m: float
+    port_m: float
+    up_m: float
+    axis_yaw_rad: float
+    offset_rad: float
+    off_axis_m: float
+
+
+class Course(NamedTuple):
+    """A velocity over ground at the present heading, and where to head.
+
+    Attributes:
+        surge_m_s: ahead.
+        sway_m_s: to port.
+        offset_rad: wanted heading less the course, positive to port.
+    """
+
+    surge_m_s: float
+    sway_m_s: float
+    offset_rad: float
+
+
+class AxisCourse(NamedTuple):
+    """What to do along the approach axis.
+
+    Attributes:
+        course: level velocity and heading.
+        heave_m_s: upwards.
+        integrals: of the line of sight, port and up.
+    """
+
+    course: Course
+    heave_m_s: float
+    integrals: tuple[float, float]
+
+
+def axis_law(
+    cfg: GuidanceCfg, modes: ModeCfg, funnel_length_m: float, reach_m_s: float, dt_s: float
+) -> Records[AxisLaw]:
+    """(1,) what the compiled laws along the axis need.
 
     Args:
         cfg: speeds, lookahead, corridor, crab.
@@ -115,19 +200,16 @@ def axis_law(cfg: GuidanceCfg, modes: ModeCfg, funnel_length_m: float, reach_m_s
         reach_m_s: from `sway_reach_m_s`.
         dt_s: control period.
     """
-    law = np.zeros(24)
-    law[_CROSS], law[_MAX_CROSS], law[_SIGMA] = cfg.cross_speed_m_s, cfg.max_cross_speed_m_s, cfg.integral_gain
-    law[_CORRIDOR], law[_CORRIDOR_FROM] = cfg.corridor_m, cfg.corridor_from_m
-    law[_CORRIDOR_SLOPE] = cfg.corridor_slope
-    law[_ENTRY_SPEED], law[_MID_SPEED], law[_FAR_SPEED] = cfg.entry_speed_m_s, cfg.mid_speed_m_s, cfg.far_speed_m_s
-    law[_FAST_BEYOND], law[_TUBE_SPEED] = cfg.fast_beyond_m, cfg.tube_speed_m_s
-    law[_MOUTH], law[_GATE] = modes.mouth_m, modes.gate_distance_m
-    law[_RUSH_EXCESS], law[_RUSH_SPEED] = cfg.rush_excess_m_s, cfg.rush_speed_m_s
-    law[_MIN_WAY], law[_STRAIGHTEN] = cfg.min_way_m_s, cfg.straighten_rad_m
-    law[_STRAIGHT_FROM], law[_FUNNEL] = cfg.straight_share * funnel_length_m, funnel_length_m
-    law[_MAX_CRAB], law[_MAX_ENTRY_CRAB], law[_VIEW] = cfg.max_crab_rad, cfg.max_entry_crab_rad, cfg.max_view_angle_rad
-    law[_REACH], law[_DT] = reach_m_s, dt_s
-    return law
+    same = {part.name: getattr(cfg, part.name) for part in fields(AxisLaw) if hasattr(cfg, part.name)}
+    return AxisLaw(
+        **same,
+        mouth_m=modes.mouth_m,
+        gate_m=modes.gate_distance_m,
+        funnel_m=funnel_length_m,
+        straight_from_m=cfg.straight_share * funnel_length_m,
+        reach_m_s=reach_m_s,
+        dt_s=dt_s,
+    ).packed()
 
 
 @compiled
@@ -154,21 +236,21 @@ def ilos(error_m: float, integral: float, lookahead_m: float, sigma: float, dt_s
 
 
 @compiled
-def corridor_m(distance_m: float, law: Array) -> float:
-    """Allowed distance from the axis when the nose is `distance_m` before the mouth; `law` is from `axis_law`."""
-    return law[_CORRIDOR] + law[_CORRIDOR_SLOPE] * max(0.0, distance_m - law[_CORRIDOR_FROM])
+def corridor_m(distance_m: float, law: Records[AxisLaw]) -> float:
+    """Allowed distance from the axis when the nose is `distance_m` before the mouth."""
+    return law[0].corridor_m + law[0].corridor_slope * max(0.0, distance_m - law[0].corridor_from_m)
 
 
 @compiled
-def approach_speed(distance_m: float, off_axis_m: float, law: Array) -> float:
-    """Forward speed over ground with a pose; `law` is from `axis_law`.
+def approach_speed(distance_m: float, off_axis_m: float, law: Records[AxisLaw]) -> float:
+    """Forward speed over ground with a pose.
 
     Full speed inside the corridor, falling to 0 at twice its width: the vehicle then closes in sideways first. Beyond
     `fast_beyond_m` the speed may rise by 0.2 m/s per metre, a deceleration of 0.1 to 0.2 m/s² on the way in.
     """
-    entry, middle = law[_ENTRY_SPEED], law[_MID_SPEED]
-    speed = entry + (middle - entry) * min(1.0, max(0.0, distance_m - 1.0))
-    speed = max(speed, min(law[_FAR_SPEED], middle + 0.2 * (distance_m - law[_FAST_BEYOND])))
+    cfg = law[0]
+    speed = cfg.entry_speed_m_s + (cfg.mid_speed_m_s - cfg.entry_speed_m_s) * min(1.0, max(0.0, distance_m - 1.0))
+    speed = max(speed, min(cfg.far_speed_m_s, cfg.mid_speed_m_s + 0.2 * (distance_m - cfg.fast_beyond_m)))
     return speed * min(1.0, max(0.0, 2.0 - off_axis_m / corridor_m(distance_m, law)))
 
 
@@ -188,63 +270,50 @@ def crab_angle(forward_m_s: float, port_m_s: float, reach_m_s: float, limit_rad:
 
 
 @compiled
-def crabbed(
+def crab(
     forward_m_s: float,
     port_m_s: float,
     course_rad: float,
-    crab_limit_rad: float,
+    limit_rad: float,
     turn_rad: float,
-    current_x_m_s: float,
-    current_y_m_s: float,
+    current_m_s: Vector,
     reach_m_s: float,
-    view_low_rad: float,
-    view_high_rad: float,
-) -> tuple[float, float, float]:
-    """A velocity over ground given along and across a world direction, and the hull's heading offset in it.
+    view_rad: tuple[float, float],
+) -> Course:
+    """Fly a velocity over ground given along and across a world direction, the hull turned into the current.
 
     Args:
         forward_m_s: along the course.
         port_m_s: across it.
         course_rad: compass direction of the course.
-        crab_limit_rad: greatest crab angle; 0 leaves crab out.
+        limit_rad: greatest crab angle; 0 leaves crab out.
         turn_rad: present heading relative to the course.
-        current_x_m_s: of the current in world axes.
-        current_y_m_s: of the current in world axes.
+        current_m_s: in world axes.
         reach_m_s: from `sway_reach_m_s`.
-        view_low_rad: least offset of the heading, so that the lights stay in the image.
-        view_high_rad: greatest offset.
-
-    Returns:
-        Surge and sway over ground at the present heading, and the wanted offset of the heading from the course.
+        view_rad: least and greatest offset of the heading, so that the lights stay in the image.
     """
     cosine, sine = math.cos(course_rad), math.sin(course_rad)
     offset = 0.0
-    if crab_limit_rad > 0.0:
-        along = current_x_m_s * cosine + current_y_m_s * sine
-        across = -current_x_m_s * sine + current_y_m_s * cosine
-        offset = crab_angle(forward_m_s - along, port_m_s - across, reach_m_s, crab_limit_rad)
-    offset = min(view_high_rad, max(view_low_rad, offset))
+    if limit_rad > 0.0:
+        along = current_m_s[0] * cosine + current_m_s[1] * sine
+        across = -current_m_s[0] * sine + current_m_s[1] * cosine
+        offset = crab_angle(forward_m_s - along, port_m_s - across, reach_m_s, limit_rad)
+    offset = min(view_rad[1], max(view_rad[0], offset))
     cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
-    return forward_m_s * cosine + port_m_s * sine, port_m_s * cosine - forward_m_s * sine, offset
+    return Course(forward_m_s * cosine + port_m_s * sine, port_m_s * cosine - forward_m_s * sine, offset)
 
 
 @compiled
 def axis_course(
-    law: Array,
-    distance_m: float,
-    port_m: float,
-    up_m: float,
-    off_axis_m: float,
-    axis_yaw_rad: float,
-    port_integral: float,
-    up_integral: float,
+    law: Records[AxisLaw],
+    place: Place,
+    integrals: tuple[float, float],
     hold: bool,
     committed: bool,
     lookahead_m: float,
     turn_rad: float,
-    current_x_m_s: float,
-    current_y_m_s: float,
-) -> tuple[float, float, float, float, float, float]:
+    current_m_s: Vector,
+) -> AxisCourse:
     """Along the approach axis: integral line of sight sideways and vertically, hull aligned but for crab.
 
     Cross-track speeds are U sin χ with χ from `ilos`; the forward speed is `approach_speed`, 0 while `hold`. Crab fades
@@ -252,61 +321,43 @@ def axis_course(
     reach raises the speed once `committed`: at more speed the same current needs less crab.
 
     Args:
-        law: from `axis_law`.
-        distance_m: nose before the mouth.
-        port_m: nose to port of the axis.
-        up_m: nose above the axis.
-        off_axis_m: nose from the axis.
-        axis_yaw_rad: compass heading straight in.
-        port_integral: of the line of sight sideways.
-        up_integral: of the line of sight vertically.
+        law: (1,) from `axis_law`.
+        place: the nose before the mouth.
+        integrals: of the line of sight, port and up.
         hold: wait at the gate.
         committed: past the gate.
         lookahead_m: Δ.
         turn_rad: heading relative to the axis.
-        current_x_m_s: of the current in world axes.
-        current_y_m_s: of the current in world axes.
-
-    Returns:
-        Surge, sway and heave over ground in m/s, offset of the heading from the axis, the two new integrals.
+        current_m_s: in world axes.
     """
-    port_angle, port_after = ilos(port_m, port_integral, lookahead_m, law[_SIGMA], law[_DT])
-    up_angle, up_after = ilos(up_m, up_integral, lookahead_m, law[_SIGMA], law[_DT])
+    cfg, distance_m, axis_yaw_rad = law[0], place.distance_m, place.axis_yaw_rad
+    port_angle, port_after = ilos(place.port_m, integrals[0], lookahead_m, cfg.integral_gain, cfg.dt_s)
+    up_angle, up_after = ilos(place.up_m, integrals[1], lookahead_m, cfg.integral_gain, cfg.dt_s)
     # Integral action is for what is left on the axis: not for the way there, nor for what the funnel's walls do.
-    if distance_m < 0.0 or off_axis_m > law[_CORRIDOR]:
-        port_after, up_after = port_integral, up_integral
-    port = limited(law[_CROSS] * math.sin(port_angle), law[_MAX_CROSS])
-    up = limited(law[_CROSS] * math.sin(up_angle), law[_MAX_CROSS])
-    forward = approach_speed(distance_m, off_axis_m, law)
-    if distance_m < law[_MOUTH]:
-        forward = law[_TUBE_SPEED] if distance_m < -law[_FUNNEL] else law[_ENTRY_SPEED]
+    if distance_m < 0.0 or place.off_axis_m > cfg.corridor_m:
+        port_after, up_after = integrals
+    port = limited(cfg.cross_speed_m_s * math.sin(port_angle), cfg.max_cross_speed_m_s)
+    up = limited(cfg.cross_speed_m_s * math.sin(up_angle), cfg.max_cross_speed_m_s)
+    forward = approach_speed(distance_m, place.off_axis_m, law)
+    if distance_m < cfg.mouth_m:
+        forward = cfg.tube_speed_m_s if distance_m < -cfg.funnel_m else cfg.entry_speed_m_s
     elif hold:
-        forward = limited(0.3 * (distance_m - law[_GATE]), 0.2)
-    across = abs(current_y_m_s * math.cos(axis_yaw_rad) - current_x_m_s * math.sin(axis_yaw_rad))
-    excess = min(1.0, max(0.0, (across - law[_REACH]) / law[_RUSH_EXCESS]))
+        forward = limited(0.3 * (distance_m - cfg.gate_m), 0.2)
+    across = abs(current_m_s[1] * math.cos(axis_yaw_rad) - current_m_s[0] * math.sin(axis_yaw_rad))
+    excess = min(1.0, max(0.0, (across - cfg.reach_m_s) / cfg.rush_excess_m_s))
     if excess > 0.0 and committed:
-        forward += excess * (law[_RUSH_SPEED] - forward)
+        forward += excess * (cfg.rush_speed_m_s - forward)
     elif excess > 0.0 and not hold:  # without way on, the hull could not hold its place by crabbing
-        forward = max(forward, excess * law[_MIN_WAY])
+        forward = max(forward, excess * cfg.min_way_m_s)
     # The hull turns straight on its way through the funnel.
-    turning = law[_STRAIGHTEN] * max(0.0, distance_m + law[_STRAIGHT_FROM])
-    limit = min(law[_MAX_CRAB], law[_MAX_ENTRY_CRAB] + turning)
+    turning = cfg.straighten_rad_m * max(0.0, distance_m + cfg.straight_from_m)
+    limit = min(cfg.max_crab_rad, cfg.max_entry_crab_rad + turning)
     bearing, view = 0.0, math.pi
     if distance_m > 1.0:
-        bearing, view = math.atan2(-port_m, distance_m), law[_VIEW]
-    surge, sway, offset = crabbed(
-        forward,
-        port,
-        axis_yaw_rad,
-        limit,
-        turn_rad,
-        current_x_m_s,
-        current_y_m_s,
-        law[_REACH],
-        bearing - view,
-        bearing + view,
-    )
-    return surge, sway, up, offset, port_after, up_after
+        bearing, view = math.atan2(-place.port_m, distance_m), cfg.max_view_angle_rad
+    window = bearing - view, bearing + view
+    course = crab(forward, port, axis_yaw_rad, limit, turn_rad, current_m_s, cfg.reach_m_s, window)
+    return AxisCourse(course, up, (port_after, up_after))
 
 
 def sway_reach_m_s(vehicle: VehicleCfg, allocator: ThrustAllocator, surge_m_s: float, share: float) -> float:
