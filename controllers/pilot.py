@@ -10,7 +10,8 @@ import numpy as np
 
 from auvdock.controllers.allocation import AllocationCfg, ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotCfg
-from auvdock.controllers.guidance import GuidanceCfg, Place, axis_law, corridor_m, sway_reach_m_s
+from auvdock.controllers.axis_guidance import Place, axis_law, corridor_m
+from auvdock.controllers.guidance import GuidanceCfg, sway_reach_m_s
 from auvdock.controllers.modes import (
     ABORT,
     ACQUIRE,

@@ -9,7 +9,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
-from auvdock.controllers.guidance import AxisLaw, GuidanceCfg, Place, axis_course, crab
+from auvdock.controllers.axis_guidance import AxisLaw, Place, axis_course, crab
+from auvdock.controllers.guidance import GuidanceCfg
 from auvdock.controllers.senses import Senses, Vector
 from auvdock.core.errors import ConfigError
 from auvdock.numeric.records import Records
@@ -215,7 +216,7 @@ def along_axis(
     current_m_s: Vector,
     law: Records[AxisLaw],
 ) -> Steering:
-    """Along the approach axis; see `guidance.axis_course`.
+    """Along the approach axis; see `axis_guidance.axis_course`.
 
     Args:
         place: the nose before the mouth.
@@ -225,7 +226,7 @@ def along_axis(
         lookahead_m: of the line of sight.
         senses: the vehicle's own.
         current_m_s: in world axes.
-        law: from `guidance.axis_law`.
+        law: from `axis_guidance.axis_law`.
     """
     turn = math.remainder(senses.yaw_rad - place.axis_yaw_rad, math.tau)
     course, heave, integrals = axis_course(law, place, integrals, hold, committed, lookahead_m, turn, current_m_s)

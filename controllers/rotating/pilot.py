@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.controllers.guidance import Place
+from auvdock.controllers.axis_guidance import Place
 from auvdock.controllers.modes import ABORT, ACQUIRE, DOCKED, FAR, MID, next_mode
 from auvdock.controllers.pilot import ConicalPilot, ControlCfg, PilotState
 from auvdock.controllers.rotating.beacon_filter import BeaconFilter, BeaconState, Sighting
@@ -156,8 +157,8 @@ class RotatingPilot:
             state = state._replace(hunt=self._watch(state, percept, senses))
         steering, state = self._steer(state, senses)
         command, flight = self.conical.act(state.flight, steering, place, senses)
-        self._log(command, state)
-        return command, state._replace(flight=flight)
+        state = state._replace(flight=flight)
+        return dataclasses.replace(command, setpoint=command.setpoint | self._believed(state)), state
 
     def _reckon(self, state: RotatingState, senses: Senses) -> RotatingState:
         """Dead reckoning of the camera in level compass axes."""
@@ -355,16 +356,16 @@ class RotatingPilot:
         bearing, _ = self.conical.compass_direction(glimpse, senses)
         return hunt._replace(hold_s=senses.time_s, hold_rad=bearing) if math.isfinite(bearing) else hunt
 
-    def _log(self, command: Command, state: RotatingState) -> None:
+    def _believed(self, state: RotatingState) -> dict[str, float]:
         """What is believed of the beacon, for the log."""
         beacon = state.beacon
         if beacon is None:
-            return
+            return {}
         x, y = self._station_m(beacon)
-        command.setpoint.update(
-            station_x_m=x,
-            station_y_m=y,
-            range_sigma_m=beacon.range_sigma_m,
-            cross_sigma_m=beacon.cross_sigma_m,
-            azimuth_rad=beacon.azimuth_rad,
-        )
+        return {
+            "station_x_m": x,
+            "station_y_m": y,
+            "range_sigma_m": beacon.range_sigma_m,
+            "cross_sigma_m": beacon.cross_sigma_m,
+            "azimuth_rad": beacon.azimuth_rad,
+        }

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from auvdock.controllers.allocation import ThrustAllocator
-from auvdock.controllers.guidance import (
-    GuidanceCfg,
+from auvdock.controllers.axis_guidance import (
     Place,
     approach_speed,
     axis_course,
@@ -19,8 +18,8 @@ from auvdock.controllers.guidance import (
     corridor_m,
     crab_angle,
     ilos,
-    sway_reach_m_s,
 )
+from auvdock.controllers.guidance import GuidanceCfg, sway_reach_m_s
 from auvdock.controllers.linear_model import hydrodynamic_wrench
 from auvdock.controllers.modes import ModeCfg
 from auvdock.controllers.steering import SearchCfg, search, search_pattern, update_sight
