@@ -152,7 +152,7 @@ class KeptCode(_caching._Cache):
         return f"{self._base()}-{hashlib.sha256(key.encode()).hexdigest()[:16]}{_SUFFIX}"
 
 
-def _fields(kinds: Iterable[Any]) -> list[object]:
+def _fields(kinds: Any) -> list[object]:  # noqa: ANN401
     """Fields of the named tuples among types of arguments: the types' own names tell only how many there are."""
     return [(tuple(getattr(kind, "fields", ())), _fields(kind.types)) for kind in kinds if hasattr(kind, "types")]
 

@@ -92,7 +92,8 @@ def test_crab_brings_sway_within_reach(forward, port, reach):
 
 def course(place, integrals=(0.0, 0.0), hold=False, committed=False, turn=0.0, current=(0.0, 0.0)):
     """On an axis that leads east: surge, sway, heave, heading offset, integrals."""
-    at = Place(*place, 0.0, turn, math.hypot(place[1], place[2]))
+    distance, port, up = place
+    at = Place(distance, port, up, 0.0, turn, math.hypot(port, up))
     level, heave, after = axis_course(LAW, at, integrals, hold, committed, CFG.lookahead_mid_m, turn, (*current, 0.0))
     return level.surge_m_s, level.sway_m_s, heave, level.offset_rad, *after
 
