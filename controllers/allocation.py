@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -9,7 +10,15 @@ from typing import Annotated
 
 import numpy as np
 
-from auvdock.controllers.planar_groups import add_planar, beyond_dead_band, least_planar, longest, planar_groups
+from auvdock.controllers.planar_groups import (
+    Member,
+    PlanarGroup,
+    add_planar,
+    allocate_planar,
+    leave_dead_band,
+    reach_along,
+    solve_planar,
+)
 from auvdock.core.arrays import Array, check_shape
 from auvdock.core.checked import Checked
 from auvdock.core.limits import Positive, between
@@ -18,8 +27,7 @@ from auvdock.core.vehicle import VehicleCfg
 __all__ = ["AllocationCfg", "ThrustAllocator"]
 
 _TINY = 1e-9
-_WIDTH = 10
-"""Columns of the table of planar groups."""
+_NOT_PLANAR = PlanarGroup(0, 0, 0, 0, np.zeros(3), np.zeros(3))
 
 Preload = Annotated[float, between(0.0, 0.5)]
 """Part of a thruster's range that it may push against another one."""
@@ -65,15 +73,16 @@ class ThrustAllocator:
         ]
         self._dead_band = np.array([actuator.dead_band for actuator in vehicle.actuators], dtype=np.float64)
         self._count = len(self._dead_band)
-        self._table = np.zeros((len(self._groups), _WIDTH))
-        start = 0
-        for index, group in enumerate(self._groups):
-            if group.planar is not None:
-                self._table[index] = group.planar
-                self._table[index, :2] = start, start + len(group.columns)
-                start += len(group.columns)
-        flat = [group.members for group in self._groups if group.planar is not None]
-        self._members = np.vstack([np.zeros((0, 5)), *flat])
+        members: list[Member] = []
+        rows_of_groups: list[PlanarGroup] = []
+        for group in self._groups:
+            if group.planar is None:
+                rows_of_groups.append(_NOT_PLANAR)
+            else:
+                end = len(members) + len(group.members)
+                rows_of_groups.append(dataclasses.replace(group.planar, first=len(members), end=end))
+                members += group.members
+        self._planar, self._members = PlanarGroup.table(rows_of_groups), Member.table(members)
 
     def effectiveness(self, surge_m_s: float) -> Array:
         """(6, n) B(u): wrench per command at forward speed `surge_m_s` through the water, body axes."""
@@ -104,9 +113,9 @@ class ThrustAllocator:
         if wrench_body.shape != (6,):
             check_shape("wrench_body", wrench_body, (6,))
         effect = surge_m_s * abs(surge_m_s)
-        values, achieved, reached = np.empty(self._count), np.zeros(6), np.empty(len(self._groups))
-        if not planar_groups(
-            values, achieved, reached, self._table, self._members, self._dead_band, wrench_body, effect, moments_first
+        values, achieved, reached = np.empty(self._count), np.zeros(6), np.empty(len(self._groups), np.bool_)
+        if not allocate_planar(
+            values, achieved, reached, self._planar, self._members, self._dead_band, wrench_body, effect, moments_first
         ):
             wanted: list[float] = wrench_body.tolist()
             for group, is_done in zip(self._groups, reached.tolist(), strict=True):
@@ -114,7 +123,7 @@ class ThrustAllocator:
                     commands = group.solve(wanted, effect, moments_first)
                     group.add_wrench(achieved, commands, effect)
                     for column, value in zip(group.columns, commands, strict=True):
-                        values[column] = beyond_dead_band(value, float(self._dead_band[column]))
+                        values[column] = leave_dead_band(value, float(self._dead_band[column]))
         return values, achieved
 
 
@@ -135,14 +144,16 @@ class _Group:
         self._inverse_weight = [inverse_weight[column] for column in columns]
         self._effect: list[list[float]] = full[np.ix_(rows, columns)].tolist()
         second = self._effect[1] if len(rows) > 1 else [0.0] * len(columns)
-        self.members = np.array([columns, self._effect[0], second, self._inverse_weight, self._fins]).T.copy()
-        # With at most two axes the closed form needs B W⁻¹ Bᵀ = G_thrusters + (u |u|)² G_fins, symmetric 2 × 2.
-        self.planar: Array | None = None
+        self.members = [
+            Member(*member)
+            for member in zip(columns, self._effect[0], second, self._inverse_weight, self._fins, strict=True)
+        ]
+        self.planar: PlanarGroup | None = None
         if len(rows) <= 2:
             thrusters, moving = _gram(self.members, fins=False), _gram(self.members, fins=True)
             if len(rows) == 1:  # a second axis that nothing acts on and that nothing is asked of
-                thrusters = (thrusters[0], 0.0, 1.0)
-            self.planar = np.array([0, len(columns), rows[0], rows[-1], *thrusters, *moving], dtype=np.float64)
+                thrusters = np.array([thrusters[0], 0.0, 1.0])
+            self.planar = PlanarGroup(0, len(columns), rows[0], rows[-1], thrusters, moving)
         # Without fins B does not depend on speed, and neither does its inverse, nor what gives no wrench.
         self._inverse: Array | None = None
         self._redundant: Array | None = None
@@ -162,9 +173,9 @@ class _Group:
             loaded = [command + bias for command, bias in zip(commands, self._bias, strict=True)]
             return loaded if max(loaded) <= 1.0 and min(loaded) >= -1.0 else commands
         if self._redundant is not None:
-            longest = partial(_longest_of_many, null=self._redundant)
+            longest = partial(_reach_along_space, null=self._redundant)
         else:
-            longest = partial(_longest, null=_null_vector(self._scaled(fin_effect)))
+            longest = partial(_reach_along, null=_null_vector(self._scaled(fin_effect)))
         idle = [0.0] * len(commands)
         if moments_first and self.rows[0] < 3 <= self.rows[-1]:
             turning, reach = longest(idle, self._least([0.0, 0.0, 0.0, *wrench[3:]], fin_effect))
@@ -175,7 +186,7 @@ class _Group:
     def add_wrench(self, wrench: Array, commands: list[float], fin_effect: float) -> None:
         """Add the wrench of the commands."""
         if self.planar is not None:
-            add_planar(self.planar, self.members, np.array(commands), fin_effect, wrench)
+            add_planar(self.planar.packed()[0], Member.table(self.members), np.array(commands), fin_effect, wrench)
             return
         for row, line in zip(self.rows, self._scaled(fin_effect), strict=True):
             wrench[row] += sum(value * command for value, command in zip(line, commands, strict=True))
@@ -191,7 +202,8 @@ class _Group:
         """Commands W⁻¹ Bᵀ (B W⁻¹ Bᵀ)⁻¹ τ, in closed form for one and two axes."""
         if self.planar is not None:
             closed = np.empty(len(self.columns))
-            if least_planar(self.planar, self.members, np.array(wrench), fin_effect, closed):
+            members = Member.table(self.members)
+            if solve_planar(self.planar.packed()[0], members, np.array(wrench), fin_effect, closed):
                 return closed.tolist()
         if self._inverse is not None:
             direct: list[float] = (self._inverse @ np.array([wrench[row] for row in self.rows])).tolist()
@@ -203,13 +215,14 @@ class _Group:
         return commands
 
 
-def _gram(members: Array, fins: bool) -> tuple[float, float, float]:
-    """Upper triangle of B W⁻¹ Bᵀ over the fins, or over the thrusters, of a planar group."""
-    a = b = d = 0.0
-    for _, p, q, weight, fin in members.tolist():
-        if bool(fin) is fins:
-            a, b, d = a + weight * p * p, b + weight * p * q, d + weight * q * q
-    return a, b, d
+def _gram(members: Sequence[Member], fins: bool) -> Array:
+    """(3,) upper triangle of B W⁻¹ Bᵀ over the fins, or over the thrusters, of a planar group."""
+    total = np.zeros(3)
+    for member in members:
+        if member.is_fin is fins:
+            x, y, weight = member.effect_x, member.effect_y, member.inverse_weight
+            total += (weight * x * x, weight * x * y, weight * y * y)
+    return total
 
 
 def _components(full: Array, rows: list[int]) -> list[tuple[list[int], list[int]]]:
@@ -257,8 +270,8 @@ def _opposed(null: Array | None, preload: float) -> list[float] | None:
     return (ahead * (preload / size)).tolist() if size > 0.1 else None
 
 
-def _longest_of_many(base: list[float], push: list[float], null: Array) -> tuple[list[float], float]:
-    """As `_longest` for any number of redundant actuators: all solutions are base + λ push + N t.
+def _reach_along_space(base: list[float], push: list[float], null: Array) -> tuple[list[float], float]:
+    """As `_reach_along` for any number of redundant actuators: all solutions are base + λ push + N t.
 
     A linear programme in (λ, t, s): max λ − ε s with |base + λ push + N t| ≤ s ≤ 1 and 0 ≤ λ ≤ 1; the small ε picks, of
     the many solutions, one with the smallest greatest command. Some milliseconds, but only out of reach.
@@ -284,8 +297,8 @@ def _longest_of_many(base: list[float], push: list[float], null: Array) -> tuple
     return np.clip(start + reach * np.array(push) + shift, -1.0, 1.0).tolist(), reach
 
 
-def _longest(base: list[float], push: list[float], null: list[float] | None) -> tuple[list[float], float]:
-    """As `longest`, of lists; without a null vector t is 0, which may fall short of the greatest λ."""
+def _reach_along(base: list[float], push: list[float], null: list[float] | None) -> tuple[list[float], float]:
+    """As `reach_along`, of lists; without a null vector t is 0, which may fall short of the greatest λ."""
     commands, no_wrench = np.empty(len(base)), np.zeros(len(base)) if null is None else np.array(null)
-    reach = longest(np.array(base), np.array(push), no_wrench, commands)
+    reach = reach_along(np.array(base), np.array(push), no_wrench, commands)
     return commands.tolist(), reach

@@ -8,7 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.controllers.control_law import body_wrench, near
+from auvdock.controllers.control_law import (
+    ControlLaw,
+    Drag,
+    Loop,
+    LoopMemory,
+    Wanted,
+    agree,
+    back_calculate,
+    body_wrench,
+)
 from auvdock.controllers.gains import AutopilotGains, DesignCfg, design_gains
 from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.arrays import Array
@@ -17,6 +26,7 @@ from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import located
 from auvdock.core.limits import Positive, PositiveShare
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.numeric.records import Records
 
 __all__ = ["Autopilot", "AutopilotCfg", "AutopilotSetpoint", "AutopilotState"]
 
@@ -77,28 +87,29 @@ class AutopilotState(NamedTuple):
     """What the loops remember.
 
     Attributes:
-        values: shaped speed references (ahead, to port, up, in m/s), smoothed current (world axes, in m/s), and the
-            integrals (wrench units) in the order surge, sway, heave, pitch, heading, and roll where it is controlled.
-        sampled: whether there was a sample yet; the current means nothing before.
+        memory: (1,) never written to.
     """
 
-    values: tuple[float, ...]
-    sampled: bool = False
+    memory: Records[LoopMemory]
 
     @property
     def references_m_s(self) -> Vector:
         """Shaped speed references in the level heading frame."""
-        return self.values[0], self.values[1], self.values[2]
+        ahead, port, up = self.memory["references_m_s"][0].tolist()
+        return ahead, port, up
 
     @property
     def current_m_s(self) -> Vector | None:
         """Smoothed current in world axes, None before the first sample."""
-        return (self.values[3], self.values[4], self.values[5]) if self.sampled else None
+        if not self.memory["sampled"][0]:
+            return None
+        x, y, z = self.memory["current_m_s"][0].tolist()
+        return x, y, z
 
     @property
     def integrals(self) -> tuple[float, ...]:
-        """Integral parts of the loops."""
-        return self.values[6:]
+        """Integral parts in the order surge, sway, heave, pitch, heading, roll; 0 for a roll that is not controlled."""
+        return tuple(self.memory["integrals"][0].tolist())
 
 
 class Autopilot:
@@ -121,11 +132,9 @@ class Autopilot:
             self.gains: AutopilotGains = design_gains(vehicle, cfg.design, dt_s)
         self._max_heave_m_s = cfg.max_heave_m_s
         self._dt_s = dt_s
-        self._smoothing = 1.0 - math.exp(-dt_s / cfg.current_time_constant_s)
         names, rows = ("surge", "sway", "heave", "pitch", "heading", "roll"), (0, 1, 2, 4, 5, 3)
-        count = 5 if self.gains.roll is None else 6
-        self._rows = rows[:count]
-        self._pids = [self.gains.loops[name].gains for name in names[:count]]
+        rows = rows[: 5 if self.gains.roll is None else 6]
+        pids = [self.gains.loops[name].gains for name in names[: len(rows)]]
         self._depth_gain = self.gains.depth.gains.kp
         thrusters = [index for index, actuator in enumerate(vehicle.actuators) if actuator.kind == "thruster"]
         wrenches = vehicle.thruster_wrenches_body[:, thrusters]
@@ -133,39 +142,32 @@ class Autopilot:
         # A propeller that gives surge alone may be used up; thrusters that also serve the moments may not.
         alone = np.abs(wrenches[1:, np.abs(wrenches[0]) > 1e-9]).max(initial=0.0) < 1e-9
         shares = [1.0 if alone else cfg.force_share, cfg.force_share, cfg.force_share, *[cfg.moment_share] * 3]
-        self.limits = tuple(share * reach[row] for share, row in zip(shares, self._rows, strict=False))
-        self._loops = np.array(
-            [
-                [row, pid.kp, pid.ki, pid.kd, limit]
-                for row, pid, limit in zip(self._rows, self._pids, self.limits, strict=True)
-            ]
-        )
-        net_weight_n = vehicle.mass_kg * 9.81 - vehicle.buoyancy_n
-        self._law = np.array(
-            [
-                cfg.surge_acceleration_m_s2,
-                cfg.sway_acceleration_m_s2,
-                cfg.max_speed_error_m_s,
-                cfg.integral_zone_rad,
-                net_weight_n,
-                dt_s,
-                cfg.max_heading_error_rad,
-            ]
+        self.limits = tuple(share * reach[row] for share, row in zip(shares, rows, strict=False))
+        self._loops = Loop.table(
+            Loop(row, pid.kp, pid.ki, pid.kd, limit) for row, pid, limit in zip(rows, pids, self.limits, strict=True)
         )
         mass = np.diag(vehicle.rigid_body_mass_body + vehicle.added_mass_body)
-        self._hull = np.vstack(
-            [
-                vehicle.linear_damping_body[:, :3],
-                vehicle.quadratic_damping_body[:, :3],
-                vehicle.lift_damping_body[:, :3],
-                vehicle.added_mass_body[:3, :3],
-                mass[:3],
-            ]
-        )
+        self._law = ControlLaw(
+            dt_s=dt_s,
+            smoothing=1.0 - math.exp(-dt_s / cfg.current_time_constant_s),
+            surge_acceleration_m_s2=cfg.surge_acceleration_m_s2,
+            sway_acceleration_m_s2=cfg.sway_acceleration_m_s2,
+            max_speed_error_m_s=cfg.max_speed_error_m_s,
+            integral_zone_rad=cfg.integral_zone_rad,
+            max_angle_error_rad=cfg.max_heading_error_rad,
+            net_weight_n=vehicle.mass_kg * 9.81 - vehicle.buoyancy_n,
+            drag=Drag(
+                linear=vehicle.linear_damping_body[:, :3],
+                quadratic=vehicle.quadratic_damping_body[:, :3],
+                lift=vehicle.lift_damping_body[:, :3],
+                added_kg=vehicle.added_mass_body[:3, :3],
+                inertia_kg=mass[:3],
+            ),
+        ).packed()
 
     def initial_state(self) -> AutopilotState:
         """At rest, integrals empty."""
-        return AutopilotState((0.0,) * (6 + len(self._loops)))
+        return AutopilotState(LoopMemory.zeros())
 
     def step(
         self, state: AutopilotState, setpoint: AutopilotSetpoint, proprioception: Proprioception
@@ -181,36 +183,22 @@ class Autopilot:
         if setpoint.depth_m is not None:
             bound = self._max_heave_m_s
             heave = min(bound, max(-bound, self._depth_gain * (senses.depth_m - setpoint.depth_m)))
-        wrench, memory = np.zeros(6), np.empty(len(state.values))
-        body_wrench(
-            wrench,
-            memory,
-            state.values,
-            senses.motion,
-            senses.yaw_rad,
-            setpoint.surge_m_s,
-            setpoint.sway_m_s,
-            heave,
+        wrench, memory = np.zeros(6), LoopMemory.zeros()
+        wanted = Wanted(
+            (setpoint.surge_m_s, setpoint.sway_m_s, heave),
             setpoint.through_water,
+            setpoint.roll_rad,
             setpoint.pitch_rad,
             setpoint.heading_rad,
-            setpoint.roll_rad,
             setpoint.turn_rad_s,
-            # The first sample of the current counts in full.
-            self._smoothing if state.sampled else 1.0,
-            self._law,
-            self._loops,
-            self._hull,
         )
-        return wrench, AutopilotState(tuple(memory.tolist()), True)
+        body_wrench(wrench, memory, state.memory, senses.motion, senses.yaw_rad, wanted, self._law, self._loops)
+        return wrench, AutopilotState(memory)
 
     def settle(self, state: AutopilotState, wanted: Array, achieved: Array) -> AutopilotState:
-        """Anti-windup for what allocation could not give: İ = (τ_achieved − τ_wanted) k_i/k_p (back-calculation)."""
-        if near(wanted, achieved):
+        """Anti-windup for what allocation could not give, see `control_law.back_calculate`."""
+        if agree(wanted, achieved):
             return state
-        missing: list[float] = (achieved - wanted).tolist()
-        corrected = [
-            integral + self._dt_s * missing[row] * gains.ki / max(gains.kp, 1e-9)
-            for integral, row, gains in zip(state.integrals, self._rows, self._pids, strict=True)
-        ]
-        return AutopilotState((*state.values[:6], *corrected), state.sampled)
+        memory = LoopMemory.zeros()
+        back_calculate(memory, state.memory, wanted, achieved, self._loops, self._dt_s)
+        return AutopilotState(memory)

@@ -2,129 +2,217 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
-from auvdock.numeric.motion import GROUND, LEVEL, PITCH, RATE, ROLL, WATER
+from auvdock.numeric.motion import Motion
+from auvdock.numeric.records import Record, Records
 from auvdock.numeric.rotations import back, headed
 from auvdock.numeric.scalars import cross, limited, within_pi
 
-__all__ = ["body_wrench", "near", "pid_step"]
+__all__ = ["ControlLaw", "Drag", "Loop", "LoopMemory", "Wanted", "agree", "back_calculate", "body_wrench", "pid_step"]
 
-# Places in the array of limits.
-_SURGE_ACCELERATION, _SWAY_ACCELERATION, _MAX_SPEED_ERROR, _INTEGRAL_ZONE, _NET_WEIGHT, _DT, _MAX_ERROR = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-)
+_PITCH, _YAW = 4, 5
+"""Rows of a wrench."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drag(Record):
+    """What a hull feels at a steady velocity through the water without rotation; SI units, body axes."""
+
+    linear: Annotated[Array, 6, 3]
+    """Linear damping, by the velocity's component."""
+    quadratic: Annotated[Array, 6, 3]
+    """Damping by a component times its magnitude."""
+    lift: Annotated[Array, 6, 3]
+    """Damping by a component times the magnitude of surge."""
+    added_kg: Annotated[Array, 3, 3]
+    """Added mass of the velocity."""
+    inertia_kg: Annotated[Array, 3]
+    """Mass with added mass of surge, sway and heave."""
+
+
+@dataclass(frozen=True, eq=False)
+class ControlLaw(Record):
+    """What of the autopilot holds for all axes."""
+
+    dt_s: float
+    """Control period."""
+    smoothing: float
+    """Weight of the current measured now."""
+    surge_acceleration_m_s2: float
+    """Greatest change of the surge reference."""
+    sway_acceleration_m_s2: float
+    """Greatest change of the sway and heave references."""
+    max_speed_error_m_s: float
+    """Greatest distance of a reference from the measured speed."""
+    integral_zone_rad: float
+    """Errors of an angle beyond this are not integrated."""
+    max_angle_error_rad: float
+    """Greatest error of an angle that counts."""
+    net_weight_n: float
+    """Weight less buoyancy."""
+    drag: Drag
+    """Of the hull."""
+
+
+@dataclass(frozen=True)
+class Loop(Record):
+    """One axis' loop; surge, sway, heave, pitch, heading, and roll where it is controlled."""
+
+    row: int
+    """Of the wrench."""
+    kp: float
+    ki: float
+    kd: float
+    limit: float
+    """Greatest output, N or N m."""
+
+
+@dataclass
+class LoopMemory(Record):
+    """What the loops remember from period to period."""
+
+    references_m_s: Annotated[Array, 3]
+    """Shaped speed references in the level heading frame."""
+    current_m_s: Annotated[Array, 3]
+    """Smoothed current in world axes."""
+    integrals: Annotated[Array, 6]
+    """Integral parts in the order of the loops, N or N m."""
+    sampled: bool
+    """Whether there was a sample yet; the current means nothing before."""
+
+
+class Wanted(NamedTuple):
+    """Set-points; the speeds are those of the level heading frame, ahead, to port, up."""
+
+    speeds_m_s: tuple[float, float, float]
+    through_water: bool
+    """Whether these speeds are through the water, not over ground."""
+    roll_rad: float
+    pitch_rad: float
+    heading_rad: float
+    turn_rad_s: float
+    """Rate at which the heading set-point turns."""
 
 
 @compiled
 def body_wrench(
     wrench: Array,
-    memory: Array,
-    state: tuple[float, ...],
-    motion: Array,
+    after: Records[LoopMemory],
+    before: Records[LoopMemory],
+    motion: Records[Motion],
     yaw_rad: float,
-    surge_m_s: float,
-    sway_m_s: float,
-    heave_m_s: float,
-    through_water: bool,
-    pitch_rad: float,
-    heading_rad: float,
-    roll_rad: float,
-    turn_rad_s: float,
-    smoothing: float,
-    limits: Array,
-    loops: Array,
-    hull: Array,
+    wanted: Wanted,
+    law: Records[ControlLaw],
+    loops: Records[Loop],
 ) -> None:
     """One period of the autopilot: τ = PID(error) + feed-forward for each axis.
 
     Args:
-        wrench: (6,) of zeros; here goes the wrench in body axes in N and N m.
-        memory: (6 + n,) here goes the next state.
-        state: (6 + n,) speed references in the level heading frame in m/s, smoothed current in world axes in m/s,
-            integrals of the n loops.
-        motion: (20,) `Senses.motion`.
+        wrench: (6,) of zeros; takes the wrench in body axes in N and N m.
+        after: (1,) takes the next memory.
+        before: (1,) the last one.
+        motion: (1,) `Senses.motion`.
         yaw_rad: compass heading.
-        surge_m_s: wanted speed ahead, level heading frame.
-        sway_m_s: wanted speed to port.
-        heave_m_s: wanted speed upwards.
-        through_water: whether these speeds are through the water, not over ground.
-        pitch_rad: set-point of the pitch.
-        heading_rad: set-point of the heading.
-        roll_rad: set-point of the roll.
-        turn_rad_s: rate at which the heading set-point turns.
-        smoothing: weight of the current measured now.
-        limits: (7,) greatest change of the surge and of the sway and heave references in m/s², greatest distance of a
-            reference from the measured speed in m/s, errors beyond which an angle is not integrated in rad, weight less
-            buoyancy in N, period in s, greatest error of an angle that counts in rad.
-        loops: (n, 5) row of the wrench, k_p, k_i, k_d, greatest output; surge, sway, heave, pitch, heading, and roll
-            where it is controlled.
-        hull: (22, 3) linear, quadratic and lift damping, six rows each, by the velocity's column; added mass of the
-            velocity, three rows; mass with added mass of surge, sway and heave.
+        wanted: set-points.
+        law: (1,) what holds for all axes.
+        loops: (n,) of the axes.
     """
-    level = motion[LEVEL:].reshape(3, 3)
+    now, cfg, last, memory = motion[0], law[0], before[0], after[0]
+    level, ground, water, dt_s = now.R_level_body, now.ground_m_s, now.water_m_s, cfg.dt_s
     world = headed(yaw_rad, level)
-    ground, water = motion[GROUND:WATER], motion[WATER:LEVEL]
-    measured = water if through_water else ground
-    references, current = memory[:3], memory[3:6]
-    # Current: ground minus water velocity, smoothed.
+    measured = water if wanted.through_water else ground
+    references, current = np.empty(3), np.empty(3)
+    # Current: ground minus water velocity, smoothed; the first sample counts in full.
+    smoothing = cfg.smoothing if last.sampled else 1.0
     ahead, port, up = ground[0] - water[0], ground[1] - water[1], ground[2] - water[2]
     for i in range(3):
-        now = world[i, 0] * ahead + world[i, 1] * port + world[i, 2] * up
-        current[i] = state[3 + i] + smoothing * (now - state[3 + i])
+        flow = world[i, 0] * ahead + world[i, 1] * port + world[i, 2] * up
+        current[i] = last.current_m_s[i] + smoothing * (flow - last.current_m_s[i])
     # References move towards the set-point at a bounded rate, not far from the measured speed.
-    dt_s = limits[_DT]
     inertia = np.empty(3)
     for i in range(3):
-        target = surge_m_s if i == 0 else sway_m_s if i == 1 else heave_m_s
-        bound = limits[_SURGE_ACCELERATION] if i == 0 else limits[_SWAY_ACCELERATION]
-        now = level[i, 0] * measured[0] + level[i, 1] * measured[1] + level[i, 2] * measured[2]
-        moved = state[i] + limited(target - state[i], bound * dt_s)
-        references[i] = now + limited(moved - now, limits[_MAX_SPEED_ERROR])
-        inertia[i] = hull[21, i] * limited((references[i] - state[i]) / dt_s, bound)
-    wanted, drift, push, weight = back(level, references), back(world, current), back(level, inertia), np.zeros(3)
-    weight[2] = limits[_NET_WEIGHT]
+        bound = cfg.surge_acceleration_m_s2 if i == 0 else cfg.sway_acceleration_m_s2
+        speed = level[i, 0] * measured[0] + level[i, 1] * measured[1] + level[i, 2] * measured[2]
+        reference = last.references_m_s[i]
+        moved = reference + limited(wanted.speeds_m_s[i] - reference, bound * dt_s)
+        references[i] = speed + limited(moved - speed, cfg.max_speed_error_m_s)
+        inertia[i] = cfg.drag.inertia_kg[i] * limited((references[i] - reference) / dt_s, bound)
+    aim, drift, push, weight = back(level, references), back(world, current), back(level, inertia), np.zeros(3)
+    weight[2] = cfg.net_weight_n
     lift = back(level, weight)
-    if through_water:
+    if wanted.through_water:
         drift = np.zeros(3)
-    balance = _balance(wanted[0] - drift[0], wanted[1] - drift[1], wanted[2] - drift[2], hull)
+    through = np.empty(3)
+    for i in range(3):
+        through[i] = aim[i] - drift[i]
+    balance = _balance(through, cfg.drag)
     for axis in range(len(loops)):
-        row = int(loops[axis, 0])
-        feed, rate = balance[row], 0.0
-        if axis < 3:
-            error = wanted[axis] - measured[axis]
+        loop = loops[axis]
+        feed, rate = balance[loop.row], 0.0
+        if loop.row < 3:
+            error = aim[axis] - measured[axis]
             feed += lift[axis]
             feed += push[axis]
-        elif axis == 3:
-            error, rate = limited(within_pi(pitch_rad - motion[PITCH]), limits[_MAX_ERROR]), motion[RATE + 1]
-        elif axis == 4:
-            error = limited(within_pi(heading_rad - yaw_rad), limits[_MAX_ERROR])
-            rate = motion[RATE + 2] - turn_rad_s
+        elif loop.row == _PITCH:
+            error, rate = within_pi(wanted.pitch_rad - now.pitch_rad), now.rate_rad_s[1]
+        elif loop.row == _YAW:
+            error, rate = within_pi(wanted.heading_rad - yaw_rad), now.rate_rad_s[2] - wanted.turn_rad_s
         else:
-            error, rate = limited(roll_rad - motion[ROLL], limits[_MAX_ERROR]), motion[RATE]
-        kp, ki, kd, limit = loops[axis, 1], loops[axis, 2], loops[axis, 3], loops[axis, 4]
-        integral = state[6 + axis]
-        output, after = pid_step(kp, ki, kd, integral, error, rate, feed, limit, dt_s)
-        wrench[row] = output
-        turning = axis >= 3 and abs(error) > limits[_INTEGRAL_ZONE]
-        memory[6 + axis] = integral if turning else after
+            error, rate = wanted.roll_rad - now.roll_rad, now.rate_rad_s[0]
+        is_turn = loop.row >= 3
+        if is_turn:
+            error = limited(error, cfg.max_angle_error_rad)
+        integral = last.integrals[axis]
+        output, candidate = pid_step(loop.kp, loop.ki, loop.kd, integral, error, rate, feed, loop.limit, dt_s)
+        wrench[loop.row] = output
+        memory.integrals[axis] = integral if is_turn and abs(error) > cfg.integral_zone_rad else candidate
+    for i in range(3):
+        memory.references_m_s[i], memory.current_m_s[i] = references[i], current[i]
+    memory.sampled = True
 
 
 @compiled
-def near(wanted: Array, achieved: Array) -> bool:
-    """Whether two wrenches (6,) are the same to 1e-6 N and N m."""
+def agree(wanted: Array, achieved: Array) -> bool:
+    """True if two wrenches (6,) agree to 1e-6 N and N m."""
     for i in range(6):
         if not -1e-6 < achieved[i] - wanted[i] < 1e-6:
             return False
     return True
+
+
+@compiled
+def back_calculate(
+    after: Records[LoopMemory],
+    before: Records[LoopMemory],
+    wanted: Array,
+    achieved: Array,
+    loops: Records[Loop],
+    dt_s: float,
+) -> None:
+    """Anti-windup: İ = (τ_achieved − τ_wanted) k_i/k_p (Åström and Hägglund 2006, section 3.5).
+
+    Args:
+        after: (1,) takes the next memory.
+        before: (1,) the last one.
+        wanted: (6,) wrench that the loops asked for.
+        achieved: (6,) wrench that they got.
+        loops: (n,) of the axes.
+        dt_s: control period.
+    """
+    last, memory = before[0], after[0]
+    for i in range(3):
+        memory.references_m_s[i], memory.current_m_s[i] = last.references_m_s[i], last.current_m_s[i]
+    memory.sampled = last.sampled
+    for axis in range(len(loops)):
+        loop = loops[axis]
+        missing = achieved[loop.row] - wanted[loop.row]
+        memory.integrals[axis] = last.integrals[axis] + dt_s * missing * loop.ki / max(loop.kp, 1e-9)
 
 
 @compiled
@@ -169,16 +257,18 @@ def pid_step(
 
 
 @compiled
-def _balance(x: float, y: float, z: float, hull: Array) -> Array:
-    """Wrench (6,) that balances drag, lift and Munk moment at a steady velocity through the water without rotation."""
+def _balance(velocity: Array, drag: Drag) -> Array:
+    """Wrench (6,) that balances drag, lift and Munk moment at a steady velocity (3,) through the water."""
     wrench, momentum = np.zeros(6), np.zeros(3)
+    x, y, z = velocity[0], velocity[1], velocity[2]
     for row in range(6):
         for column in range(3):
-            part = x if column == 0 else y if column == 1 else z
-            drag = hull[row, column] + hull[6 + row, column] * abs(part) + hull[12 + row, column] * abs(x)
-            wrench[row] -= drag * part
+            part = velocity[column]
+            damping = drag.linear[row, column] + drag.quadratic[row, column] * abs(part)
+            damping += drag.lift[row, column] * abs(x)
+            wrench[row] -= damping * part
     for row in range(3):
-        momentum[row] = hull[18 + row, 0] * x + hull[18 + row, 1] * y + hull[18 + row, 2] * z
+        momentum[row] = drag.added_kg[row, 0] * x + drag.added_kg[row, 1] * y + drag.added_kg[row, 2] * z
     munk = cross(x, y, z, momentum[0], momentum[1], momentum[2])
     for axis in range(3):
         wrench[3 + axis] += munk[axis]

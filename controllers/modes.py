@@ -191,10 +191,10 @@ def _after_far(facts: Facts, cfg: ModeCfg, has_pose: bool) -> str:
 
 
 def _after_mid(facts: Facts, cfg: ModeCfg, has_pose: bool, sees_light: bool) -> str:
-    close = facts.distance_m < cfg.commit_distance_m
+    committed = facts.distance_m < cfg.commit_distance_m
     if facts.since_fix_s > cfg.pose_lost_s:
-        return ABORT if close else FAR if sees_light else ACQUIRE
-    if (facts.jumped and close) or facts.held_s > cfg.hold_s or facts.in_mode_s > cfg.mid_timeout_s:
+        return ABORT if committed else FAR if sees_light else ACQUIRE
+    if (facts.jumped and committed) or facts.held_s > cfg.hold_s or facts.in_mode_s > cfg.mid_timeout_s:
         return ABORT
     at_gate = facts.distance_m <= cfg.gate_distance_m
     inside = facts.off_axis_m <= facts.allowed_m and facts.heading_error_rad <= cfg.gate_heading_rad

@@ -10,7 +10,8 @@ import numpy as np
 
 from auvdock.controllers.allocation import AllocationCfg, ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotCfg
-from auvdock.controllers.guidance import GuidanceCfg, axis_law, corridor_m, sway_reach_m_s
+from auvdock.controllers.axis_guidance import Place, axis_law, corridor_m
+from auvdock.controllers.guidance import GuidanceCfg, sway_reach_m_s
 from auvdock.controllers.modes import (
     ABORT,
     ACQUIRE,
@@ -23,12 +24,11 @@ from auvdock.controllers.modes import (
     ModeCfg,
     next_mode,
 )
-from auvdock.controllers.pilot_state import PilotState
+from auvdock.controllers.pilot_state import PilotState, Progress, Stage
 from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
 from auvdock.controllers.rotating.config import RotatingControlCfg
 from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.controllers.steering import (
-    Place,
     SearchCfg,
     Sight,
     Steering,
@@ -36,8 +36,8 @@ from auvdock.controllers.steering import (
     back_off,
     search,
     search_pattern,
-    sighted,
     towards_light,
+    update_sight,
 )
 from auvdock.core.camera import Camera
 from auvdock.core.checked import Checked
@@ -124,23 +124,7 @@ class ConicalPilot:
 
     def initial_state(self) -> PilotState:
         """Searching, with nothing known."""
-        return PilotState(
-            mode=ACQUIRE,
-            since_s=None,
-            attempts=1,
-            giving_up=False,
-            relative=None,
-            sight=None,
-            autopilot=self.autopilot.initial_state(),
-            integrals=(0.0, 0.0),
-            offset_rad=0.0,
-            anchor_rad=0.0,
-            anchor_depth_m=0.0,
-            side=1.0,
-            best_m=math.inf,
-            best_s=0.0,
-            gate_s=None,
-        )
+        return PilotState(self.autopilot.initial_state())
 
     def step(
         self, state: PilotState, percept: Percept | None, proprioception: Proprioception
@@ -157,32 +141,16 @@ class ConicalPilot:
         self, state: PilotState, percept: Percept | None, senses: Senses
     ) -> tuple[PilotState, Place | None, Facts]:
         """The first half of a control period: estimates and progress, and what the mode is judged by."""
-        if state.since_s is None:
-            state = state._replace(
-                since_s=senses.time_s, anchor_rad=senses.yaw_rad, anchor_depth_m=senses.depth_m, best_s=senses.time_s
-            )
+        if state.stage.since_s is None:
+            now_s, yaw_rad, depth_m = senses.time_s, senses.yaw_rad, senses.depth_m
+            stage = state.stage._replace(since_s=now_s, anchor_rad=yaw_rad, anchor_depth_m=depth_m)
+            state = state._replace(stage=stage, progress=Progress(best_s=now_s))
         before = state.relative
         relative = self._track(before, percept, senses)
         sight = self._look(state.sight, percept, senses)
         place = self.place(relative, senses) if relative is not None else None
-        best_m, best_s, gate_s = self._progress(state, place, senses.time_s)
-        state = PilotState(
-            state.mode,
-            state.since_s,
-            state.attempts,
-            state.giving_up,
-            relative,
-            sight,
-            state.autopilot,
-            state.integrals,
-            state.offset_rad,
-            state.anchor_rad,
-            state.anchor_depth_m,
-            state.side,
-            best_m,
-            best_s,
-            gate_s,
-        )
+        progress = self._progress(state, place, senses.time_s)
+        state = state._replace(relative=relative, sight=sight, progress=progress)
         jumped = relative is not None and before is not None and relative.restarts > before.restarts
         return state, place, self._facts(state, place, senses, jumped)
 
@@ -211,7 +179,7 @@ class ConicalPilot:
         if not math.isfinite(azimuth + elevation):
             return sight
         range_m = bearing.range_m if bearing.range_m is not None and math.isfinite(bearing.range_m) else None
-        return sighted(sight, senses.time_s, azimuth, elevation, range_m, self.cfg.guidance.sight_smoothing)
+        return update_sight(sight, senses.time_s, azimuth, elevation, range_m, self.cfg.guidance.sight_smoothing)
 
     def compass_direction(self, bearing: Bearing, senses: Senses) -> tuple[float, float]:
         """Compass azimuth, positive to port, and elevation of a bearing in rad."""
@@ -234,11 +202,11 @@ class ConicalPilot:
             math.hypot(port_m, up_m),
         )
 
-    def _progress(self, state: PilotState, place: Place | None, now_s: float) -> tuple[float, float, float | None]:
+    def _progress(self, state: PilotState, place: Place | None, now_s: float) -> Progress:
         """Best distance, when it was reached, and since when the vehicle waits at the gate."""
-        best_m, best_s, gate_s = state.best_m, state.best_s, state.gate_s
+        best_m, best_s, gate_s = state.progress
         if place is None:
-            return best_m, best_s, gate_s
+            return state.progress
         modes, distance_m = self.cfg.modes, place.distance_m
         if distance_m < best_m - modes.progress_m:
             best_m, best_s = distance_m, now_s
@@ -246,10 +214,10 @@ class ConicalPilot:
             gate_s = None
         elif gate_s is None:
             gate_s = now_s
-        return best_m, best_s, gate_s
+        return Progress(best_m, best_s, gate_s)
 
     def _facts(self, state: PilotState, place: Place | None, senses: Senses, jumped: bool) -> Facts:
-        now, relative, sight = senses.time_s, state.relative, state.sight
+        now, relative, sight, progress = senses.time_s, state.relative, state.sight, state.progress
         since_fix_s = distance_m = off_axis_m = allowed_m = heading_error_rad = sigma_m = since_sight_s = math.inf
         fixes = sights = 0
         range_m = None
@@ -258,34 +226,34 @@ class ConicalPilot:
         if place is not None:
             distance_m, off_axis_m = place.distance_m, place.off_axis_m
             allowed_m = corridor_m(distance_m, self._law)
-            heading_error_rad = abs(place.offset_rad - state.offset_rad)
+            heading_error_rad = abs(place.offset_rad - state.line.offset_rad)
         if sight is not None:
             sights, since_sight_s = sight.frames, now - sight.time_s
             if since_sight_s < 1.0:
                 range_m = sight.trusted_range_m(self.cfg.modes.min_blind_range_m)
         return Facts(
-            senses.latched,
-            fixes,
-            since_fix_s,
-            jumped,
-            distance_m,
-            off_axis_m,
-            allowed_m,
-            heading_error_rad,
-            sigma_m,
-            sights,
-            since_sight_s,
-            range_m,
-            now - (state.since_s or 0.0),
-            now - state.gate_s if state.gate_s is not None else 0.0,
-            now - state.best_s,
-            distance_m < -self._end_m,
-            state.giving_up,
+            latched=senses.latched,
+            fixes=fixes,
+            since_fix_s=since_fix_s,
+            jumped=jumped,
+            distance_m=distance_m,
+            off_axis_m=off_axis_m,
+            allowed_m=allowed_m,
+            heading_error_rad=heading_error_rad,
+            sigma_m=sigma_m,
+            sights=sights,
+            since_sight_s=since_sight_s,
+            range_m=range_m,
+            in_mode_s=now - (state.stage.since_s or 0.0),
+            held_s=now - progress.gate_s if progress.gate_s is not None else 0.0,
+            stalled_s=now - progress.best_s,
+            missed=distance_m < -self._end_m,
+            giving_up=state.stage.giving_up,
         )
 
     def enter(self, state: PilotState, mode: str, place: Place | None, senses: Senses) -> PilotState:
         """Book-keeping at a change of mode."""
-        attempts, giving_up = state.attempts, state.giving_up
+        attempts, giving_up = state.stage.attempts, state.stage.giving_up
         if mode == ABORT:
             giving_up = attempts >= self.cfg.modes.max_attempts
             attempts = min(attempts + 1, self.cfg.modes.max_attempts)
@@ -295,24 +263,23 @@ class ConicalPilot:
         elif mode == ACQUIRE and state.sight is not None:
             anchor = state.sight.azimuth_rad
         turn = math.remainder(anchor - senses.yaw_rad, math.tau)
-        return state._replace(
+        stage = Stage(
             mode=mode,
             since_s=senses.time_s,
             attempts=attempts,
             giving_up=giving_up,
-            integrals=state.integrals if mode in (NEAR, TERMINAL) else (0.0, 0.0),
             anchor_rad=anchor,
             anchor_depth_m=senses.depth_m,
-            side=math.copysign(1.0, turn) if turn != 0.0 else state.side,
-            best_m=place.distance_m if place is not None else math.inf,
-            best_s=senses.time_s,
-            gate_s=None,
+            side=math.copysign(1.0, turn) if turn != 0.0 else state.stage.side,
         )
+        progress = Progress(place.distance_m if place is not None else math.inf, senses.time_s)
+        line = state.line if mode in (NEAR, TERMINAL) else state.line._replace(integrals=(0.0, 0.0))
+        return state._replace(stage=stage, progress=progress, line=line)
 
     def _steer(self, state: PilotState, place: Place | None, senses: Senses) -> Steering:
-        cfg, mode = self.cfg, state.mode
+        cfg, stage, mode = self.cfg, state.stage, state.mode
         current = state.autopilot.current_m_s or (0.0, 0.0, 0.0)
-        in_mode_s = senses.time_s - (state.since_s or 0.0)
+        in_mode_s = senses.time_s - (stage.since_s or 0.0)
         if mode == FAR and state.sight is not None:
             return towards_light(
                 state.sight,
@@ -328,7 +295,7 @@ class ConicalPilot:
             at_gate = place.distance_m < cfg.modes.gate_distance_m
             return along_axis(
                 place,
-                state.integrals,
+                state.line.integrals,
                 mode == MID and (at_gate or (blind and place.distance_m < cfg.modes.commit_distance_m + 1.0)),
                 mode != MID,
                 cfg.guidance.lookahead_mid_m if mode == MID else cfg.guidance.lookahead_near_m,
@@ -339,10 +306,10 @@ class ConicalPilot:
         if mode == ABORT and place is not None:
             return back_off(place, senses, current, self.reach_m_s, cfg.guidance)
         hold = search(
-            in_mode_s, state.anchor_rad, state.anchor_depth_m, state.side, place is None, self._pattern, cfg.search
+            in_mode_s, stage.anchor_rad, stage.anchor_depth_m, stage.side, place is None, self._pattern, cfg.search
         )
         if mode == ABORT:
-            point = hold.setpoint._replace(surge_m_s=-cfg.guidance.back_speed_m_s, heading_rad=state.anchor_rad)
+            point = hold.setpoint._replace(surge_m_s=-cfg.guidance.back_speed_m_s, heading_rad=stage.anchor_rad)
             return Steering(point)
         return hold
 
@@ -365,21 +332,5 @@ class ConicalPilot:
             log["depth_m"] = point.depth_m
         if place is not None:
             log["distance_m"], log["port_m"], log["up_m"] = place.distance_m, place.port_m, place.up_m
-        after = PilotState(
-            state.mode,
-            state.since_s,
-            state.attempts,
-            state.giving_up,
-            state.relative,
-            state.sight,
-            loops,
-            (steering.port_integral, steering.up_integral),
-            steering.offset_rad,
-            state.anchor_rad,
-            state.anchor_depth_m,
-            state.side,
-            state.best_m,
-            state.best_s,
-            state.gate_s,
-        )
-        return Command(values, state.mode, log, state.giving_up), after
+        after = state._replace(autopilot=loops, line=steering.line)
+        return Command(values, state.mode, log, state.stage.giving_up), after

@@ -12,7 +12,8 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.numeric.cholesky import factorise, forward
 from auvdock.numeric.compiled import compiled
-from auvdock.numeric.motion import GROUND, LEVEL, RATE, WATER
+from auvdock.numeric.motion import Motion
+from auvdock.numeric.records import Records
 from auvdock.numeric.rotations import headed, sine_axis
 from auvdock.numeric.scalars import cross, within_pi
 
@@ -29,7 +30,7 @@ _LEAST_AHEAD = 0.2
 def relative_period(
     estimate: Array,
     covariance: Array,
-    motion: Array,
+    motion: Records[Motion],
     yaw_rad: float,
     dt_s: float,
     mounting: Array,
@@ -44,7 +45,7 @@ def relative_period(
     Args:
         estimate: (4,) camera in the station frame in m, ψ_s in rad; brought up to date in place.
         covariance: (4, 4) P; likewise.
-        motion: (20,) `Senses.motion`.
+        motion: (1,) `Senses.motion`.
         yaw_rad: compass heading.
         dt_s: period; 0 to leave the dead reckoning out.
         mounting: (5, 3) R_body_camera, the camera on the body in m, the light of the bearing in the station frame in m.
@@ -69,13 +70,19 @@ def relative_period(
 
 @compiled
 def _reckon(
-    estimate: Array, covariance: Array, motion: Array, yaw_rad: float, dt_s: float, mounting: Array, process: Array
+    estimate: Array,
+    covariance: Array,
+    motion: Records[Motion],
+    yaw_rad: float,
+    dt_s: float,
+    mounting: Array,
+    process: Array,
 ) -> None:
     """ṗ = R_station_body (v + ω × r_camera), P ← F P Fᵀ + Q."""
-    body, rate, lever = motion[GROUND:WATER], motion[RATE:GROUND], mounting[3]
+    body, rate, lever = motion[0].ground_m_s, motion[0].rate_rad_s, mounting[3]
     swing = cross(rate[0], rate[1], rate[2], lever[0], lever[1], lever[2])
     ahead, port, up = body[0] + swing[0], body[1] + swing[1], body[2] + swing[2]
-    turned = headed(yaw_rad - estimate[3], motion[LEVEL:].reshape(3, 3))
+    turned = headed(yaw_rad - estimate[3], motion[0].R_level_body)
     velocity = np.empty(3)
     for i in range(3):
         velocity[i] = turned[i, 0] * ahead + turned[i, 1] * port + turned[i, 2] * up
@@ -88,7 +95,7 @@ def _reckon(
 def _fuse_pose(
     estimate: Array,
     covariance: Array,
-    motion: Array,
+    motion: Records[Motion],
     yaw_rad: float,
     mounting: Array,
     pose: Array,
@@ -127,7 +134,7 @@ def _fuse_pose(
 def _fuse_bearing(
     estimate: Array,
     covariance: Array,
-    motion: Array,
+    motion: Records[Motion],
     yaw_rad: float,
     mounting: Array,
     ray: Array,
@@ -184,9 +191,9 @@ def _shift(estimate: Array, shift: Array) -> None:
 
 
 @compiled
-def _station_camera(motion: Array, heading_rad: float, mounting: Array) -> Array:
+def _station_camera(motion: Records[Motion], heading_rad: float, mounting: Array) -> Array:
     """R_station_camera (3, 3) of a body that heads `heading_rad` in the station frame."""
-    body, camera = headed(heading_rad, motion[LEVEL:].reshape(3, 3)), np.empty((3, 3))
+    body, camera = headed(heading_rad, motion[0].R_level_body), np.empty((3, 3))
     for i in range(3):
         for j in range(3):
             camera[i, j] = body[i, 0] * mounting[0, j] + body[i, 1] * mounting[1, j] + body[i, 2] * mounting[2, j]

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
 from auvdock.numeric.compiled import compiled
-from auvdock.numeric.motion import GROUND, LEVEL, MOTION, PITCH, RATE, ROLL, WATER
+from auvdock.numeric.motion import Motion
+from auvdock.numeric.records import Records
 from auvdock.numeric.rotations import headed, rotation_of_euler_zyx
 from auvdock.numeric.scalars import Vector
 
@@ -26,7 +25,7 @@ class Senses(NamedTuple):
         yaw_rad: compass heading of the body, the last of the Euler angles zyx in the world; positive to port.
         contact: bow switch.
         latched: latch reported closed.
-        motion: (20,) what compiled code reads, never written to; its places are `numeric.motion`.
+        motion: (1,) what compiled code reads, never written to.
     """
 
     time_s: float
@@ -34,34 +33,34 @@ class Senses(NamedTuple):
     yaw_rad: float
     contact: bool
     latched: bool
-    motion: Array
+    motion: Records[Motion]
 
     @property
     def roll_rad(self) -> float:
         """Positive to starboard."""
-        return self.motion.item(ROLL)
+        return self.motion["roll_rad"].item()
 
     @property
     def pitch_rad(self) -> float:
         """Positive nose down."""
-        return self.motion.item(PITCH)
+        return self.motion["pitch_rad"].item()
 
     @property
     def rate_rad_s(self) -> Vector:
         """p, q, r."""
-        p, q, r = self.motion[RATE:GROUND].tolist()
+        p, q, r = self.motion["rate_rad_s"][0].tolist()
         return p, q, r
 
     @property
     def ground_m_s(self) -> Vector:
         """Velocity over ground, body axes."""
-        x, y, z = self.motion[GROUND:WATER].tolist()
+        x, y, z = self.motion["ground_m_s"][0].tolist()
         return x, y, z
 
     @property
     def surge_water_m_s(self) -> float:
         """Forward velocity through the water."""
-        return self.motion.item(WATER)
+        return self.motion["water_m_s"].item(0)
 
     def level(self, heading_rad: float, vector: Vector) -> Vector:
         """A vector of body axes in level axes against which the vehicle heads `heading_rad` to port: Rz R v."""
@@ -77,8 +76,8 @@ def read_senses(proprioception: Proprioception) -> Senses:
     depth, time = proprioception.depth_m, proprioception.time_s
     euler = proprioception.euler_zyx_rad
     yaw = float(euler[2])
-    motion = np.empty(MOTION)
-    _motion(
+    motion = Motion.zeros()
+    _sense(
         motion,
         euler,
         proprioception.angular_velocity_rad_s,
@@ -96,21 +95,30 @@ def read_senses(proprioception: Proprioception) -> Senses:
 
 
 @compiled
-def _motion(motion: Array, euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array) -> None:
-    """Write `Senses.motion`."""
-    motion[ROLL], motion[PITCH] = euler_rad[0], euler_rad[1]
+def _sense(motion: Records[Motion], euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array) -> None:
+    """Write `Senses.motion` (1,)."""
+    now = motion[0]
+    now.roll_rad, now.pitch_rad = _finite(euler_rad[0]), _finite(euler_rad[1])
     for i in range(3):
-        motion[RATE + i], motion[GROUND + i], motion[WATER + i] = rate_rad_s[i], ground_m_s[i], water_m_s[i]
-    for i in range(LEVEL):
-        if not math.isfinite(motion[i]):
-            motion[i] = 0.0
-    motion[LEVEL:] = rotation_of_euler_zyx(motion[ROLL], motion[PITCH], 0.0).ravel()
+        now.rate_rad_s[i] = _finite(rate_rad_s[i])
+        now.ground_m_s[i] = _finite(ground_m_s[i])
+        now.water_m_s[i] = _finite(water_m_s[i])
+    level = rotation_of_euler_zyx(now.roll_rad, now.pitch_rad, 0.0)
+    for i in range(3):
+        for j in range(3):
+            now.R_level_body[i, j] = level[i, j]
 
 
 @compiled
-def _level(motion: Array, heading_rad: float, x: float, y: float, z: float) -> Vector:
+def _finite(value: float) -> float:
+    """The value, or 0 in the place of one that is not finite."""
+    return value if math.isfinite(value) else 0.0
+
+
+@compiled
+def _level(motion: Records[Motion], heading_rad: float, x: float, y: float, z: float) -> Vector:
     """`Senses.level`, from `Senses.motion`."""
-    R = headed(heading_rad, motion[LEVEL:].reshape(3, 3))
+    R = headed(heading_rad, motion[0].R_level_body)
     return (
         R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
         R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
@@ -119,7 +127,7 @@ def _level(motion: Array, heading_rad: float, x: float, y: float, z: float) -> V
 
 
 @compiled
-def _level_ray(motion: Array, heading_rad: float, R_body_camera: Array, ray_camera: Array) -> Vector:
+def _level_ray(motion: Records[Motion], heading_rad: float, R_body_camera: Array, ray_camera: Array) -> Vector:
     """`Senses.level_ray`, from `Senses.motion`."""
     R, (x, y, z) = R_body_camera, (ray_camera[0], ray_camera[1], ray_camera[2])
     return _level(

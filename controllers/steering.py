@@ -9,15 +9,17 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
-from auvdock.controllers.guidance import GuidanceCfg, axis_course, crabbed
+from auvdock.controllers.axis_guidance import AxisLaw, Place, axis_course, crab
+from auvdock.controllers.guidance import GuidanceCfg
 from auvdock.controllers.senses import Senses, Vector
-from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 from auvdock.core.limits import Positive
+from auvdock.numeric.records import Records
+from auvdock.numeric.scalars import limited
 
 __all__ = [
-    "Place",
+    "Line",
     "SearchCfg",
     "Sight",
     "Steering",
@@ -26,8 +28,8 @@ __all__ = [
     "ground_course",
     "search",
     "search_pattern",
-    "sighted",
     "towards_light",
+    "update_sight",
 ]
 
 
@@ -80,7 +82,7 @@ class Sight(NamedTuple):
         return self.range_m if self.widest_m >= 2.0 * least_m else None
 
 
-def sighted(
+def update_sight(
     last: Sight | None, time_s: float, azimuth_rad: float, elevation_rad: float, range_m: float | None, smoothing: float
 ) -> Sight:
     """The sight after one more frame: a running mean that turns into an exponential one with weight `smoothing`.
@@ -89,57 +91,40 @@ def sighted(
     """
     if last is None or time_s - last.time_s > 3.0:
         return Sight(1, time_s, azimuth_rad, elevation_rad, range_m)
-    frames, _, azimuth, elevation, ranged, widest, looks = last
-    looks += 1
+    looks, mean_m = last.looks + 1, last.range_m
     share = 1.0 / looks
     weight = max(smoothing, share)
-    azimuth += weight * math.remainder(azimuth_rad - azimuth, math.tau)
+    azimuth = last.azimuth_rad + weight * math.remainder(azimuth_rad - last.azimuth_rad, math.tau)
     if range_m is not None:
-        ranged = range_m if ranged is None else ranged + max(0.25 * smoothing, share) * (range_m - ranged)
+        mean_m = range_m if mean_m is None else mean_m + max(0.25 * smoothing, share) * (range_m - mean_m)
     return Sight(
-        frames + 1,
+        last.frames + 1,
         time_s,
         math.remainder(azimuth, math.tau),
-        elevation + weight * (elevation_rad - elevation),
-        ranged,
-        max(widest, ranged or 0.0) if looks * smoothing > 2.0 else 0.0,
+        last.elevation_rad + weight * (elevation_rad - last.elevation_rad),
+        mean_m,
+        max(last.widest_m, mean_m or 0.0) if looks * smoothing > 2.0 else 0.0,
         looks,
     )
 
 
-class Place(NamedTuple):
-    """The nose before the mouth in approach axes (forward into the funnel, port, up).
+class Line(NamedTuple):
+    """What guidance remembers.
 
     Attributes:
-        distance_m: before the mouth; negative inside.
-        port_m: to port of the axis.
-        up_m: above the axis.
-        axis_yaw_rad: compass heading of a vehicle that flies straight in.
-        offset_rad: heading relative to that, positive to port.
-        off_axis_m: distance from the axis.
-    """
-
-    distance_m: float
-    port_m: float
-    up_m: float
-    axis_yaw_rad: float
-    offset_rad: float
-    off_axis_m: float
-
-
-class Steering(NamedTuple):
-    """A set-point with what guidance remembers.
-
-    Attributes:
-        setpoint: for the autopilot.
-        port_integral, up_integral: of the integral line of sight.
+        integrals: of the integral line of sight, port and up.
         offset_rad: wanted heading relative to the axis.
     """
 
-    setpoint: AutopilotSetpoint
-    port_integral: float = 0.0
-    up_integral: float = 0.0
+    integrals: tuple[float, float] = (0.0, 0.0)
     offset_rad: float = 0.0
+
+
+class Steering(NamedTuple):
+    """A set-point, and what guidance remembers of it."""
+
+    setpoint: AutopilotSetpoint
+    line: Line = Line()
 
 
 def search_pattern(cfg: SearchCfg) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -212,11 +197,11 @@ def towards_light(
     elif sight.range_m is not None:
         speed = min(speed, cfg.mid_speed_m_s)
     climb = max(speed, 0.3) * math.tan(min(0.7, max(-0.7, sight.elevation_rad - wanted)))
-    climb = _clip(climb, cfg.max_vertical_speed_m_s)
+    climb = limited(climb, cfg.max_vertical_speed_m_s)
     setpoint, offset = ground_course(
         speed, 0.0, climb, sight.azimuth_rad, cfg.max_crab_rad, senses, current_m_s, reach_m_s
     )
-    return Steering(setpoint, offset_rad=offset)
+    return Steering(setpoint, Line(offset_rad=offset))
 
 
 def along_axis(
@@ -227,9 +212,9 @@ def along_axis(
     lookahead_m: float,
     senses: Senses,
     current_m_s: Vector,
-    law: Array,
+    law: Records[AxisLaw],
 ) -> Steering:
-    """Along the approach axis; see `guidance.axis_course`.
+    """Along the approach axis; see `axis_guidance.axis_course`.
 
     Args:
         place: the nose before the mouth.
@@ -239,39 +224,25 @@ def along_axis(
         lookahead_m: of the line of sight.
         senses: the vehicle's own.
         current_m_s: in world axes.
-        law: from `guidance.axis_law`.
+        law: from `axis_guidance.axis_law`.
     """
-    distance, port, up, course, _, off_axis = place
-    turn = math.remainder(senses.yaw_rad - course, math.tau)
-    surge, sway, heave, offset, port_integral, up_integral = axis_course(
-        law,
-        distance,
-        port,
-        up,
-        off_axis,
-        course,
-        integrals[0],
-        integrals[1],
-        hold,
-        committed,
-        lookahead_m,
-        turn,
-        current_m_s[0],
-        current_m_s[1],
-    )
-    return Steering(AutopilotSetpoint(surge, sway, heave, 0.0, course + offset), port_integral, up_integral, offset)
+    turn = math.remainder(senses.yaw_rad - place.axis_yaw_rad, math.tau)
+    course, heave, integrals = axis_course(law, place, integrals, hold, committed, lookahead_m, turn, current_m_s)
+    heading = place.axis_yaw_rad + course.offset_rad
+    setpoint = AutopilotSetpoint(course.surge_m_s, course.sway_m_s, heave, 0.0, heading)
+    return Steering(setpoint, Line(integrals, course.offset_rad))
 
 
 def back_off(place: Place, senses: Senses, current_m_s: Vector, reach_m_s: float, cfg: GuidanceCfg) -> Steering:
     """Backwards along the axis with the hull aligned; inside the funnel straight back."""
     port = up = 0.0
     if place.distance_m > 0.0:
-        port = _clip(-0.25 * place.port_m, cfg.max_cross_speed_m_s)
-        up = _clip(-0.25 * place.up_m, cfg.max_cross_speed_m_s)
+        port = limited(-0.25 * place.port_m, cfg.max_cross_speed_m_s)
+        up = limited(-0.25 * place.up_m, cfg.max_cross_speed_m_s)
     setpoint, offset = ground_course(
         -cfg.back_speed_m_s, port, up, place.axis_yaw_rad, 0.0, senses, current_m_s, reach_m_s
     )
-    return Steering(setpoint, offset_rad=offset)
+    return Steering(setpoint, Line(offset_rad=offset))
 
 
 def ground_course(
@@ -289,20 +260,8 @@ def ground_course(
 
     The offset is the crab angle, kept within `view_rad` so that the lights stay in the image.
     """
-    surge, sway, offset = crabbed(
-        forward_m_s,
-        port_m_s,
-        course_rad,
-        crab_limit_rad,
-        math.remainder(senses.yaw_rad - course_rad, math.tau),
-        current_m_s[0],
-        current_m_s[1],
-        reach_m_s,
-        view_rad[0],
-        view_rad[1],
+    turn = math.remainder(senses.yaw_rad - course_rad, math.tau)
+    surge, sway, offset = crab(
+        forward_m_s, port_m_s, course_rad, crab_limit_rad, turn, current_m_s, reach_m_s, view_rad
     )
     return AutopilotSetpoint(surge, sway, up_m_s, 0.0, course_rad + offset), offset
-
-
-def _clip(value: float, bound: float) -> float:
-    return bound if value > bound else -bound if value < -bound else value

@@ -148,8 +148,13 @@ class KeptCode(_caching._Cache):
 
     def _name(self, sig: object, codegen: Any) -> str:  # noqa: ANN401
         cells = tuple(cell.cell_contents for cell in self._function.__closure__ or ())
-        key = repr((str(sig), codegen.magic_tuple(), _dumps(cells) if cells else b""))
+        key = repr((str(sig), _fields(sig), codegen.magic_tuple(), _dumps(cells) if cells else b""))
         return f"{self._base()}-{hashlib.sha256(key.encode()).hexdigest()[:16]}{_SUFFIX}"
+
+
+def _fields(kinds: Any) -> list[object]:  # noqa: ANN401
+    """Fields of the named tuples among types of arguments: the types' own names tell only how many there are."""
+    return [(tuple(getattr(kind, "fields", ())), _fields(kind.types)) for kind in kinds if hasattr(kind, "types")]
 
 
 @lru_cache(maxsize=1)

@@ -1,11 +1,29 @@
-"""Places in the array of a vehicle's own motion that the controllers' kernels read (`controllers.senses`)."""
+"""A vehicle's own motion as its sensors tell it, for the controllers' compiled laws (`controllers.senses`)."""
 
 from __future__ import annotations
 
-__all__ = ["GROUND", "LEVEL", "MOTION", "PITCH", "RATE", "ROLL", "WATER"]
+from dataclasses import dataclass
+from typing import Annotated
 
-ROLL, PITCH, RATE, GROUND, WATER, LEVEL = 0, 1, 2, 5, 8, 11
-"""Roll and pitch (positive nose down) in rad; p, q, r in rad/s; velocity over ground and through the water in body axes
-in m/s (3 each); rotation from body axes to the level heading frame (ahead, port, up), row by row (9)."""
-MOTION = 20
-"""Numbers in all."""
+from auvdock.numeric.arrays import Array
+from auvdock.numeric.records import Record
+
+__all__ = ["Motion"]
+
+
+@dataclass
+class Motion(Record):
+    """Attitude and velocities; body axes x forward, y port, z up. The compass heading is not among them."""
+
+    roll_rad: float
+    """Positive to starboard."""
+    pitch_rad: float
+    """Positive nose down."""
+    rate_rad_s: Annotated[Array, 3]
+    """p, q, r."""
+    ground_m_s: Annotated[Array, 3]
+    """Velocity over ground, body axes."""
+    water_m_s: Annotated[Array, 3]
+    """Velocity through the water, body axes."""
+    R_level_body: Annotated[Array, 3, 3]
+    """Rotation from body axes to the level heading frame: ahead, port, up."""

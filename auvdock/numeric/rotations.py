@@ -21,6 +21,7 @@ __all__ = [
     "rotation_of_euler_zyx",
     "rotation_of_quat_wxyz",
     "sine_axis",
+    "turn_matrix",
     "vector_of",
 ]
 
@@ -50,8 +51,9 @@ def headed(heading_rad: float, level: Array) -> Array:
 
 
 @compiled
-def rotation_of_quat_wxyz(w: float, x: float, y: float, z: float) -> tuple[Vector, Vector, Vector]:
-    """Rows of the rotation of a unit quaternion; numbers and no array, so that who needs one row pays for no more."""
+def rotation_of_quat_wxyz(quat: Array) -> tuple[Vector, Vector, Vector]:
+    """Rows of the rotation of a unit quaternion (4,); tuples, so that who needs one row pays for no more."""
+    w, x, y, z = quat[0], quat[1], quat[2], quat[3]
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
         (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
@@ -135,3 +137,20 @@ def back(rotation: Array, vector: Array) -> Array:
     for i in range(3):
         out[i] = rotation[0, i] * vector[0] + rotation[1, i] * vector[1] + rotation[2, i] * vector[2]
     return out
+
+
+@compiled
+def turn_matrix(matrix: Array, rotation: Array) -> Array:
+    """(6, 6) T M Tᵀ with T = diag(R, 1) of a matrix M (6, 6), linear parts first, and a rotation R (3, 3)."""
+    half, whole = np.empty((6, 6)), np.empty((6, 6))
+    for j in range(6):
+        a, b, c = matrix[0, j], matrix[1, j], matrix[2, j]
+        for i in range(3):
+            half[i, j] = rotation[i, 0] * a + rotation[i, 1] * b + rotation[i, 2] * c
+            half[3 + i, j] = matrix[3 + i, j]
+    for i in range(6):
+        a, b, c = half[i, 0], half[i, 1], half[i, 2]
+        for j in range(3):
+            whole[i, j] = a * rotation[j, 0] + b * rotation[j, 1] + c * rotation[j, 2]
+            whole[i, 3 + j] = half[i, 3 + j]
+    return whole

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from auvdock.numeric.arrays import Array
 from auvdock.numeric.compiled import compiled
 
-__all__ = ["Vector", "cross", "limited", "within_pi"]
+__all__ = ["Vector", "cross", "halves", "limited", "within_pi"]
 
 Vector = tuple[float, float, float]
 
@@ -23,6 +24,12 @@ def limited(value: float, bound: float) -> float:
 def within_pi(angle_rad: float) -> float:
     """The same angle in [-π, π]: less the nearest number of whole turns, of two equally near ones the even."""
     return angle_rad - math.tau * np.rint(angle_rad / math.tau)
+
+
+@compiled
+def halves(twist: Array) -> tuple[Vector, Vector]:
+    """The linear and the angular part of a velocity or a wrench (6,)."""
+    return (twist[0], twist[1], twist[2]), (twist[3], twist[4], twist[5])
 
 
 @compiled

@@ -1,57 +1,72 @@
-"""Thrusters and fins between command and wrench: what is constant about them, and their states."""
+"""Thrusters and fins between command and wrench: what is constant about them, and how they stand."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from auvdock.core.arrays import Array, check_shape
+from auvdock.core.arrays import Array
+from auvdock.core.marine import flip_vector
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.numeric.records import Record, Records
 
-__all__ = ["Actuators"]
+__all__ = ["Actuator", "make_actuators"]
 
 _RHO_KG_M3 = 1025.0
 
 
-class Actuators:
-    """First-order actuators, stepped exactly for a command held over the step (`stepping.respond`).
+@dataclass
+class Actuator(Record):
+    """A first-order actuator, stepped exactly for a command held over the step (`stepping.respond`).
 
-    A command c is clipped to [-1, 1] and set to 0 inside the dead band; the state then follows τ ẋ + x = c. A thruster
-    gives max_force × x, a fin stands at max_angle × x.
-
-    Attributes:
-        thrusters: which of them are thrusters.
-        state: (n,) in [-1, 1].
-        table: (4, n) per actuator 1 − e^(−dt/τ), dead band, greatest force in N (−1 for a fin) and 2 / (ρ A) in m/kg
-            (0 for a fin).
+    A thruster gives `wrench` times its state, a fin stands at its greatest angle times its state.
     """
 
-    def __init__(self, vehicle: VehicleCfg, dt_s: float) -> None:
-        """Precompute the lag factors for a step of `dt_s`."""
-        actuators = vehicle.actuators
-        fins = [actuator.kind == "fin" for actuator in actuators]
-        self.thrusters = [index for index, fin in enumerate(fins) if not fin]
-        self.table: Array = np.zeros((4, len(actuators)))
-        for index, actuator in enumerate(actuators):
-            self.table[:2, index] = 1.0 - math.exp(-dt_s / actuator.time_constant_s), actuator.dead_band
-            self.table[2, index] = -1.0
-            if not fins[index]:
-                area_m2 = 0.25 * math.pi * actuator.disc_diameter_m**2
-                self.table[2:, index] = actuator.max_force_n, 2.0 / (_RHO_KG_M3 * area_m2)
-        self.reset()
+    is_fin: bool
+    lag: float
+    """1 − e^(−dt/τ): share of the way to its command that the state goes in a step."""
+    dead_band: float
+    """Commands of a smaller magnitude do nothing."""
+    max_force_n: float
+    """At state 1; 0 for a fin."""
+    disc_m_kg: float
+    """2 / (ρ A) with the area A of a thruster's disc; 0 for a fin."""
+    wrench: Annotated[Array, 6]
+    """At state 1, body axes, in N and N m; of a fin per m²/s² of u |u|."""
+    advance: Annotated[Array, 6]
+    """A thruster's advance speed is this times ν_r; 0 for a fin."""
+    place_m: Annotated[Array, 3]
+    """In the body frame."""
+    radius_m: float
+    """Of a thruster's disc; 0 for a fin, whose place is in no vehicle's data: it is immersed as the hull is."""
+    command: float = 0.0
+    """Held over the step."""
+    state: float = 0.0
+    """In [-1, 1]."""
+    immersed: float = 1.0
+    """Share that is under water."""
+    advance_m_s: float = 0.0
+    """Advance speed along the thrust axis."""
 
-    def reset(self) -> None:
-        """All at rest."""
-        self.state: Array = np.zeros(self.table.shape[1])
 
-    def checked(self, command: Array | Sequence[float]) -> Array:
-        """A command as an array (n,).
-
-        Raises:
-            ValueError: another shape.
-        """
-        values = np.asarray(command, dtype=np.float64)
-        check_shape("command", values, self.state.shape)
-        return values
+def make_actuators(vehicle: VehicleCfg, dt_s: float) -> Records[Actuator]:
+    """(n,) a vehicle's actuators at rest, for steps of `dt_s`."""
+    rows: list[Actuator] = []
+    for part, wrench in zip(vehicle.actuators, vehicle.thruster_wrenches_body.T, strict=True):
+        is_fin, thrust = part.kind == "fin", float(np.linalg.norm(wrench[:3]))
+        actuator = Actuator(
+            is_fin=is_fin,
+            lag=1.0 - math.exp(-dt_s / part.time_constant_s),
+            dead_band=part.dead_band,
+            max_force_n=0.0 if is_fin else part.max_force_n,
+            disc_m_kg=0.0 if is_fin else 2.0 / (_RHO_KG_M3 * (0.25 * math.pi * part.disc_diameter_m**2)),
+            wrench=wrench,
+            advance=np.zeros(6) if is_fin or thrust == 0.0 else wrench / thrust,
+            place_m=flip_vector(np.array(part.position_m)),
+            radius_m=0.0 if is_fin else 0.5 * part.disc_diameter_m,
+        )
+        rows.append(actuator)
+    return Actuator.table(rows)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from auvdock.core.arrays import Array
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.numeric.rotations import rotation_of_quat_wxyz
 from auvdock.sim.contacts import Contacts
 from auvdock.sim.dock import DockReport, Watch, Weld
 from auvdock.sim.latch import Latch
-from auvdock.sim.state import rotation_rows
 from auvdock.sim.station_geometry import station_geoms
 
 __all__ = ["ConicalDock"]
@@ -30,7 +32,7 @@ class ConicalDock:
         self._reach_m = vehicle.nose_x_m
         self._latch = Latch(station.latch, station.funnel)
         # The latch looks at a nose behind the throat only; the station frame is not turned against the world.
-        self.watch = Watch(self._reach_m, (1.0, 0.0, 0.0), -station.funnel.length_m)
+        self.watch = Watch(self._reach_m, np.array([1.0, 0.0, 0.0]), -station.funnel.length_m)
         self._nose_m = (math.inf, 0.0, 0.0)
         self._axis_angle_rad = 0.0
 
@@ -48,7 +50,7 @@ class ConicalDock:
 
     def update(self, time_s: float, qpos: list[float], qvel: list[float], contacts: Contacts) -> Weld | None:
         """Follow the nose; the weld holds the body where it is, at the nose, as a pawl behind the bow would."""
-        r00, r01, r02, r10, _, _, r20, _, _ = rotation_rows(*qpos[3:7])
+        (r00, r01, r02), (r10, _, _), (r20, _, _) = rotation_of_quat_wxyz(np.array(qpos[3:]))
         reach = self._reach_m
         nose = qpos[0] + reach * r00, qpos[1] + reach * r10, qpos[2] + reach * r20 + self.depth_m
         # The tube points along −x of the station frame, which is not turned against the world.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple, Protocol
 
 from auvdock.core.arrays import Array
+from auvdock.numeric.records import Record
 from auvdock.sim.contacts import Contacts
 from auvdock.sim.latch import Entry
 from auvdock.sim.truth import LandingTruth
@@ -20,12 +22,14 @@ class Weld(NamedTuple):
     quat_wxyz: tuple[float, float, float, float]
 
 
-class Watch(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Watch(Record):
     """Where the dock has to see every physics step: while n · p ≤ offset, p on the body's x axis, world frame."""
 
     reach_m: float
     """x of the point p in the body frame."""
-    normal_world: tuple[float, float, float]
+    normal_world: Annotated[Array, 3]
+    """n."""
     offset_m: float
 
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.numeric.records import Record, Records
 
-__all__ = ["GRAVITY_M_S2", "Hydrodynamics"]
+__all__ = ["GRAVITY_M_S2", "Hull", "make_hull"]
 
 GRAVITY_M_S2 = 9.81
 """Standard of the vehicle data: weight = mass × 9.81."""
 
 
-class Hydrodynamics:
-    """The water's forces on one vehicle, as constants for `stepping.wrench` and `stepping.add_mass`.
+@dataclass
+class Hull(Record):
+    """A hull for `stepping.wrench` and `stepping.add_mass`: coefficients, and how much of it is under water.
 
     With the body's acceleration ν̇ over ground, the accelerating water's u̇_c and v_r = v − Rᵀ u_c, Fossen (2011,
     chapters 6 and 8) reads, for the free joint's coordinates (a, ω̇) with a = R (v̇ + ω × v):
@@ -25,35 +28,42 @@ class Hydrodynamics:
 
     The second term turns MuJoCo's world-frame acceleration into the body-frame derivative that M_A multiplies; the
     third is the Froude-Krylov force of accelerating water on the displaced mass m_d. Only gusts accelerate the water:
-    shear is taken as quasi-steady.
-
-    All is one matrix product W z: z stacks ν_r, |ν_r|ν_r, |u_r|ν_r, that acceleration and the actuators; W ν gives the
-    damping and actuator wrench, the momentum M_A ν_r and the thrusters' advance speeds at once.
-
-    Attributes:
-        weights: (12 + k, 21 + n) W, for k thrusters among n actuators.
-        added: (6, 6) M_A.
-        displaced_kg: m_d.
-        buoyancy_n: buoyancy.
+    shear is taken as quasi-steady. The D-terms are D ν_r + D_q |ν_r|ν_r + |u_r| D_l ν_r.
     """
 
-    def __init__(self, vehicle: VehicleCfg, thrusters: Sequence[int]) -> None:
-        """Assemble W; `thrusters` lists which actuators need an advance speed."""
-        added = vehicle.added_mass_body
-        wrenches = vehicle.thruster_wrenches_body
-        count = wrenches.shape[1]
-        weights = np.zeros((12 + len(thrusters), 21 + count))
-        weights[:6, :6] = vehicle.linear_damping_body
-        weights[:6, 6:12] = vehicle.quadratic_damping_body
-        weights[:6, 12:18] = vehicle.lift_damping_body
-        weights[:6, 18:21] = added[:, :3]
-        weights[:6, 21:] = wrenches
-        weights[6:12, :6] = added
-        for slot, index in enumerate(thrusters):
-            column = wrenches[:, index]
-            thrust = float(np.linalg.norm(column[:3]))
-            weights[12 + slot, :6] = column / thrust if thrust > 0.0 else 0.0
-        self.weights = weights
-        self.added: Array = np.ascontiguousarray(added)
-        self.displaced_kg = vehicle.buoyancy_n / GRAVITY_M_S2
-        self.buoyancy_n = vehicle.buoyancy_n
+    linear_damping: Annotated[Array, 6, 6]
+    """D, SI units, body axes; like the next three from `VehicleCfg`."""
+    quadratic_damping: Annotated[Array, 6, 6]
+    """D_q."""
+    lift_damping: Annotated[Array, 6, 6]
+    """D_l."""
+    added_mass: Annotated[Array, 6, 6]
+    """M_A."""
+    displaced_kg: float
+    """m_d."""
+    buoyancy_n: float
+    """Of the whole hull."""
+    clearance_m: float
+    """All of the vehicle is under water while its origin is this deep, whatever its attitude."""
+    immersed: float
+    """Share s of the displaced volume that is under water; exactly 1 is all."""
+    growth_1_s: float
+    """ds/dt while it grows, else 0."""
+    moment_m: Annotated[Array, 3]
+    """Moment of the immersed volume's shares about the origin, body axes; 0 of the whole hull."""
+
+
+def make_hull(vehicle: VehicleCfg, clearance_m: float) -> Records[Hull]:
+    """(1,) a vehicle's hull, all of it under water."""
+    return Hull(
+        linear_damping=vehicle.linear_damping_body,
+        quadratic_damping=vehicle.quadratic_damping_body,
+        lift_damping=vehicle.lift_damping_body,
+        added_mass=vehicle.added_mass_body,
+        displaced_kg=vehicle.buoyancy_n / GRAVITY_M_S2,
+        buoyancy_n=vehicle.buoyancy_n,
+        clearance_m=clearance_m,
+        immersed=1.0,
+        growth_1_s=0.0,
+        moment_m=np.zeros(3),
+    ).packed()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -11,10 +13,13 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.marine import flip_vector
 from auvdock.core.vehicle import HullPartCfg, VehicleCfg
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.records import Record, Records
 from auvdock.numeric.rotations import rotation_of_quat_wxyz
 from auvdock.numeric.scalars import cross
+from auvdock.sim.actuation import Actuator
+from auvdock.sim.hydrodynamics import Hull
 
-__all__ = ["Immersion", "immerse"]
+__all__ = ["Piece", "clearance_m", "cut_hull", "immerse"]
 
 _SLICES = 24
 """Slices of a round part along its axis."""
@@ -22,50 +27,49 @@ _LAYERS, _MOST_CELLS = 3, 12
 """Cells of a box along its shortest edge, and the most along any."""
 
 
-class Immersion:
-    """What of a vehicle is under water, for `stepping.advance`.
+@dataclass(frozen=True)
+class Piece(Record):
+    """A piece of the displaced volume, immersed as a disc that stands upright is."""
 
-    The displaced volume is cut into pieces: slices of a round part, cells of a box. Each is immersed as a disc that
-    stands upright is, so a level cylinder exactly, at other attitudes and for boxes to some hundredths of the volume.
-    A piece's buoyancy depends on its own height alone, so that all of it has a potential and does no work over a
-    closed path. The pieces' weights are their volumes, tilted linearly so that their middle is the vehicle's origin:
-    that is the centre of buoyancy by the vehicle's data, while a torpedo's tail, which its hull does not show,
-    tapers. Still water without waves; air does nothing.
+    place_m: Annotated[Array, 3]
+    """In the body frame."""
+    radius_m: float
+    weight: float
+    """Share of the volume; all add up to 1."""
 
-    Attributes:
-        clearance_m: the vehicle is under water as long as its origin is this deep, whatever its attitude.
-        pieces: (m, 5) see `immerse`.
-        under: (5 + n,) likewise, of a vehicle that is all under water.
+
+def cut_hull(vehicle: VehicleCfg) -> Records[Piece]:
+    """(m,) pieces of a vehicle's displaced volume: slices of a round part, cells of a box.
+
+    Each is immersed as a disc that stands upright is, so a level cylinder exactly, at other attitudes and for boxes to
+    some hundredths of the volume. A piece's buoyancy depends on its own height alone, so that all of it has a potential
+    and does no work over a closed path. The pieces' weights are their volumes, tilted linearly so that their middle is
+    the vehicle's origin: that is the centre of buoyancy by the vehicle's data, while a torpedo's tail, which its hull
+    does not show, tapers. Still water without waves; air does nothing.
+
+    Raises:
+        ConfigError: a hull about the centre of buoyancy of which no volume can be spread.
     """
+    places, radii, volumes = (
+        np.concatenate(parts) for parts in zip(*(_cut(part) for part in vehicle.displacing_parts), strict=True)
+    )
+    pieces = Piece.zeros(len(volumes))
+    pieces["place_m"], pieces["radius_m"], pieces["weight"] = places, radii, volumes
+    pieces["weight"] = _balanced(pieces["place_m"], pieces["weight"], vehicle.name)
+    return pieces
 
-    def __init__(self, vehicle: VehicleCfg) -> None:
-        """Cut the hull into pieces.
 
-        Raises:
-            ConfigError: a hull about the centre of buoyancy of which no volume can be spread.
-        """
-        self.pieces = _balanced(np.concatenate([_cut(part) for part in vehicle.displacing_parts]), vehicle.name)
-        places = [flip_vector(np.array(actuator.position_m)) for actuator in vehicle.actuators]
-        # A fin's place is in no vehicle's data: it fares as the hull does.
-        reach = [0.5 * part.disc_diameter_m if part.kind == "thruster" else 0.0 for part in vehicle.actuators]
-        self._actuators: Array = np.column_stack([np.array(places), np.array(reach)])
-        spheres = np.concatenate([self.pieces[:, :4], self._actuators])
-        self.clearance_m = float(np.max(np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]))
-        self.under: Array = np.ones(5 + len(reach))
-        self.under[1:5] = 0.0
-        self._near = self.under.copy()
-
-    def of(self, qpos: Array, qvel: Array) -> Array:
-        """(5 + n,) what `immerse` says of a state (7,), (6,) of the body; good until the next call."""
-        if qpos[2] < -self.clearance_m:
-            return self.under
-        immerse(qpos, qvel, self.pieces, self._actuators, self._near)
-        return self._near
+def clearance_m(pieces: Records[Piece], actuators: Records[Actuator]) -> float:
+    """Depth of the origin from which all of the vehicle is under water, whatever its attitude."""
+    reach = [np.linalg.norm(parts["place_m"], axis=1) + parts["radius_m"] for parts in (pieces, actuators)]
+    return float(np.concatenate(reach).max())
 
 
 @compiled
-def immerse(qpos: Array, qvel: Array, pieces: Array, actuators: Array, out: Array) -> None:
-    """What of the hull and of each actuator is under water.
+def immerse(
+    qpos: Array, qvel: Array, pieces: Records[Piece], hull: Records[Hull], actuators: Records[Actuator]
+) -> None:
+    """Work out what of the hull and of each actuator is under water: the sea ends at z = 0.
 
     A disc of radius a that stands upright with its middle at height z is immersed to the share
     f = (arccos t − t √(1 − t²)) / π of its area, t = z / a between −1 and 1.
@@ -73,18 +77,19 @@ def immerse(qpos: Array, qvel: Array, pieces: Array, actuators: Array, out: Arra
     Args:
         qpos: (7,) position and quaternion wxyz of the body.
         qvel: (6,) velocity in the world frame, angular velocity in the body frame.
-        pieces: (m, 5) of the hull: place in the body frame, radius a, weight; weights add up to 1.
-        actuators: (n, 4) place in the body frame and radius; radius 0 takes the hull's share.
-        out: (5 + n,) takes the hull's share s, in which exactly 1 is all; ds/dt in 1/s while it grows, else 0; the
-            moment Σ f w p of the shares about the origin in m, body frame (3); the actuators' shares.
+        pieces: (m,) of the hull.
+        hull: (1,) takes its immersed share s, ds/dt while s grows, and the moment Σ f w p of the pieces at p.
+        actuators: (n,) take their immersed shares; radius 0 takes the hull's.
     """
-    _, _, (up_x, up_y, up_z) = rotation_of_quat_wxyz(qpos[3], qpos[4], qpos[5], qpos[6])
-    rise_x, rise_y, rise_z = cross(up_x, up_y, up_z, qvel[3], qvel[4], qvel[5])
-    dry, growth = 0.0, 0.0
-    for i in range(5):
-        out[i] = 0.0
+    _, _, (up_x, up_y, up_z) = rotation_of_quat_wxyz(qpos[3:])
+    rate = qvel[3:]
+    rise_x, rise_y, rise_z = cross(up_x, up_y, up_z, rate[0], rate[1], rate[2])
+    dry, growth, moment = 0.0, 0.0, hull[0].moment_m
+    for i in range(3):
+        moment[i] = 0.0
     for i in range(len(pieces)):
-        a, b, c, radius, weight = pieces[i, 0], pieces[i, 1], pieces[i, 2], pieces[i, 3], pieces[i, 4]
+        place, radius, weight = pieces[i].place_m, pieces[i].radius_m, pieces[i].weight
+        a, b, c = place[0], place[1], place[2]
         t = (qpos[2] + up_x * a + up_y * b + up_z * c) / radius
         if t <= -1.0:
             continue
@@ -94,21 +99,22 @@ def immerse(qpos: Array, qvel: Array, pieces: Array, actuators: Array, out: Arra
         dry += part
         growth -= weight * 2.0 / math.pi * chord / radius * (qvel[2] + rise_x * a + rise_y * b + rise_z * c)
         # The whole hull's moment is nothing: what is out of the water tells the rest's.
-        out[2] -= part * a
-        out[3] -= part * b
-        out[4] -= part * c
-    out[0], out[1] = max(0.0, 1.0 - dry), max(0.0, growth)
+        moment[0] -= part * a
+        moment[1] -= part * b
+        moment[2] -= part * c
+    hull[0].immersed, hull[0].growth_1_s = max(0.0, 1.0 - dry), max(0.0, growth)
     for i in range(len(actuators)):
-        a, b, c, radius = actuators[i, 0], actuators[i, 1], actuators[i, 2], actuators[i, 3]
+        place, radius = actuators[i].place_m, actuators[i].radius_m
         if radius > 0.0:
-            t = min(max((qpos[2] + up_x * a + up_y * b + up_z * c) / radius, -1.0), 1.0)
-            out[5 + i] = (math.acos(t) - t * math.sqrt(1.0 - t * t)) / math.pi
+            height = qpos[2] + up_x * place[0] + up_y * place[1] + up_z * place[2]
+            t = min(max(height / radius, -1.0), 1.0)
+            actuators[i].immersed = (math.acos(t) - t * math.sqrt(1.0 - t * t)) / math.pi
         else:
-            out[5 + i] = out[0]
+            actuators[i].immersed = hull[0].immersed
 
 
-def _cut(part: HullPartCfg) -> Array:
-    """(m, 5) pieces of a hull part: place in package body axes, radius, volume."""
+def _cut(part: HullPartCfg) -> tuple[Array, Array, Array]:
+    """Pieces of a hull part: places (m, 3) in package body axes, radii (m,), volumes (m,)."""
     middle = flip_vector(np.array(part.position_m))
     length, width, _ = part.size_m
     if part.shape == "box":
@@ -126,12 +132,11 @@ def _cut(part: HullPartCfg) -> Array:
             into_cap = np.maximum(0.0, np.abs(x) - 0.5 * (length - width))
             radii = np.sqrt(radii**2 - into_cap**2)
         volumes = math.pi * radii**2 * length / _SLICES
-    return np.column_stack([middle + places, radii, volumes])
+    return middle + places, radii, volumes
 
 
-def _balanced(pieces: Array, name: str) -> Array:
+def _balanced(places: Array, volumes: Array, name: str) -> Array:
     """Volumes turned into weights that add up to 1 and have their middle in the origin."""
-    places, volumes = pieces[:, :3], pieces[:, 4]
     shares = volumes / volumes.sum()
     middle = shares @ places
     about = places - middle
@@ -139,4 +144,4 @@ def _balanced(pieces: Array, name: str) -> Array:
     weights = shares * (1.0 + about @ tilt)
     if np.any(weights <= 0.0) or np.abs(weights @ places).max() > 1e-6:
         raise ConfigError("hull", name, "parts whose volume lies about the origin, the centre of buoyancy")
-    return np.column_stack([pieces[:, :4], weights])
+    return weights

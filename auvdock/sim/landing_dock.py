@@ -9,11 +9,11 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.numeric.rotations import rotation_of_quat_wxyz
 from auvdock.sim.contacts import Contacts
 from auvdock.sim.dock import DockReport, Watch, Weld
 from auvdock.sim.landing_geometry import landing_geoms
 from auvdock.sim.landing_latch import LandingLatch, Posture
-from auvdock.sim.state import rotation_rows
 from auvdock.sim.truth import LandingTruth
 
 __all__ = ["LandingDock"]
@@ -39,7 +39,7 @@ class LandingDock:
         self._place_z_m = station.guide.seat_height_m - station.depth_m
         self._latch = LandingLatch(station.latch)
         # Well before anything can touch: the touchdown takes its speed from the step before.
-        self.watch = Watch(0.0, (0.0, 0.0, 1.0), self._place_z_m + _WATCH_M)
+        self.watch = Watch(0.0, np.array([0.0, 0.0, 1.0]), self._place_z_m + _WATCH_M)
         self._last_down_m_s = 0.0
         self._nose_m = (0.0, 0.0, 0.0)
         self._posture = Posture((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
@@ -60,7 +60,7 @@ class LandingDock:
 
     def update(self, time_s: float, qpos: list[float], qvel: list[float], contacts: Contacts) -> Weld | None:
         """Follow the seat; the weld pulls it to its place, heading and pitch to the centre line's, roll as it is."""
-        r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_rows(*qpos[3:7])
+        (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = rotation_of_quat_wxyz(np.array(qpos[3:]))
         sx, sy, sz = self._seat_body_m
         p, q, r = qvel[3:6]
         ax, ay, az = q * sz - r * sy, r * sx - p * sz, p * sy - q * sx

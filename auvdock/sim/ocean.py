@@ -11,7 +11,10 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
 from auvdock.core.limits import Positive, between
-from auvdock.sim.stepping import flow
+from auvdock.numeric.compiled import compiled
+from auvdock.numeric.records import Records
+from auvdock.numeric.scalars import Vector
+from auvdock.numeric.water import Water, water_velocity
 
 __all__ = ["CurrentCfg", "Ocean"]
 
@@ -41,12 +44,10 @@ class Ocean:
     """The water's velocity at the vehicle.
 
     Gusts are a first-order Gauss-Markov process, T ġ + g = white noise (Fossen 2011, section 8.3), uniform in space
-    and discretised exactly (`stepping.blow`).
+    and discretised exactly (`numeric.water.advance_gust`).
 
     Attributes:
-        current: (6,) mean velocity (2) in m/s, its shear per metre and the depth in m at which it holds, and the gusts'
-            decay e^(−dt/T) and drive σ √(1 − e^(−2 dt/T)) in m/s.
-        gust: (2,) present gust, world frame, m/s; the simulator's steps advance it.
+        water: (1,) current and present gust, world frame; the simulator's steps advance it.
     """
 
     def __init__(self, cfg: CurrentCfg, reference_depth_m: float, dt_s: float) -> None:
@@ -65,21 +66,22 @@ class Ocean:
         """Start anew, with gusts drawn from their stationary distribution."""
         azimuth = math.radians(cfg.direction_deg)
         decay = math.exp(-self._dt_s / cfg.gust_time_constant_s)
-        mean = cfg.speed_m_s * math.cos(azimuth), cfg.speed_m_s * math.sin(azimuth)
-        drive = cfg.gust_std_m_s * math.sqrt(1.0 - decay * decay)
-        self.current = np.array([*mean, cfg.shear_per_m, self._reference_depth_m, decay, drive])
-        self.gust: Array = np.zeros(2)
         self._rng = rng
         self._gusty = cfg.gust_std_m_s > 0.0
         self._noise: Array = np.zeros((0, 2))
-        if self._gusty:
-            self.gust[:] = cfg.gust_std_m_s * rng.standard_normal(2)
+        self.water: Records[Water] = Water(
+            mean_m_s=np.array([cfg.speed_m_s * math.cos(azimuth), cfg.speed_m_s * math.sin(azimuth)]),
+            shear_1_m=cfg.shear_per_m,
+            reference_depth_m=self._reference_depth_m,
+            gust_decay=decay,
+            gust_drive_m_s=cfg.gust_std_m_s * math.sqrt(1.0 - decay * decay),
+            gust_m_s=cfg.gust_std_m_s * rng.standard_normal(2) if self._gusty else np.zeros(2),
+            gust_m_s2=np.zeros(2),
+        ).packed()
 
     def velocity(self, z_world_m: float) -> Array:
         """(3,) velocity of the water in the world frame, m/s, at a height z (0 at the surface, negative below)."""
-        water = np.zeros(3)
-        flow(z_world_m, self.current, self.gust, water)
-        return water
+        return np.array(_velocity(self.water, z_world_m))
 
     def noise(self, steps: int) -> Array:
         """(m, 2) normal numbers that drive the next gusts, a row a step, m from 1 to `steps`; (0, 2) without gusts."""
@@ -91,3 +93,9 @@ class Ocean:
     def used(self, steps: int) -> None:
         """Take note that so many rows of `noise` have driven the gusts."""
         self._noise = self._noise[steps:]
+
+
+@compiled
+def _velocity(water: Records[Water], z_world_m: float) -> Vector:
+    """`water_velocity` of an array (1,), as Python hands it over."""
+    return water_velocity(water[0], z_world_m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, cast
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from auvdock.core.checked import Checked
 from auvdock.core.contracts import Proprioception
 from auvdock.core.limits import NotNegative
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.records import Record, Records
 from auvdock.numeric.scalars import within_pi
 
 __all__ = ["SensorCfg", "Sensors"]
@@ -50,33 +52,51 @@ _BLOCK = 64
 """Samples whose noise is drawn at once: one call of the generator costs as much as the numbers of one sample."""
 
 
+@dataclass
+class Readings(Record):
+    """A number for each channel: a reading, its deviation, its bias or a normal number."""
+
+    depth_m: float
+    euler_zyx_rad: Annotated[Array, 3]
+    angular_velocity_rad_s: Annotated[Array, 3]
+    velocity_ground_m_s: Annotated[Array, 3]
+    velocity_water_m_s: Annotated[Array, 3]
+
+
+_CHANNELS = Readings.dtype().itemsize // 8
+"""Numbers in it."""
+
+
 class Sensors:
     """Draws what the sensors say from the true state."""
 
     def __init__(self, cfg: SensorCfg) -> None:
         """Prepare; call `reset` before use."""
         self._cfg = cfg
-        c = cfg
-        # One standard normal each: depth, roll, pitch, yaw, gyro, ground velocity, water velocity.
-        self._std = np.array(
-            [c.depth_noise_m, c.attitude_noise_rad, c.attitude_noise_rad, c.heading_noise_rad]
-            + [c.gyro_noise_rad_s] * 3
-            + [c.ground_velocity_noise_m_s] * 3
-            + [c.water_velocity_noise_m_s] * 3
-        )
-        self._bias_std = np.array(
-            [c.depth_bias_m, c.attitude_bias_rad, c.attitude_bias_rad, c.heading_bias_rad]
-            + [c.gyro_bias_rad_s] * 3
-            + [0.0] * 6
-        )
+        self._std = Readings(
+            cfg.depth_noise_m,
+            np.array([cfg.attitude_noise_rad, cfg.attitude_noise_rad, cfg.heading_noise_rad]),
+            np.full(3, cfg.gyro_noise_rad_s),
+            np.full(3, cfg.ground_velocity_noise_m_s),
+            np.full(3, cfg.water_velocity_noise_m_s),
+        ).packed()
+        self._bias_std = Readings(
+            cfg.depth_bias_m,
+            np.array([cfg.attitude_bias_rad, cfg.attitude_bias_rad, cfg.heading_bias_rad]),
+            np.full(3, cfg.gyro_bias_rad_s),
+            np.zeros(3),
+            np.zeros(3),
+        ).packed()
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator, compass_datum_rad: float = 0.0) -> None:
         """Draw this episode's biases; `rng` then belongs to the sensors, and the datum is added to the compass."""
         self._rng = rng
         self._datum_rad = compass_datum_rad
-        self._bias = self._bias_std * rng.standard_normal(13)
-        self._noise, self._row = np.zeros((0, 13)), _BLOCK
+        drawn, self._bias = _normal(rng, 1), Readings.zeros()
+        for name in Readings.dtype().names or ():
+            self._bias[name] = self._bias_std[name] * drawn[name]
+        self._noise, self._row = _normal(rng, 0), _BLOCK
         self._scale = 1.0 + self._cfg.velocity_scale_error * float(rng.standard_normal())
 
     def sample(
@@ -91,43 +111,52 @@ class Sensors:
     ) -> Proprioception:
         """One sample of all sensors; depth in m, angles (3,) in rad, velocities (6,) in m/s and rad/s."""
         if self._row == _BLOCK:
-            self._noise, self._row = self._rng.standard_normal((_BLOCK, 13)), 0
-        noise = self._noise[self._row]
+            self._noise, self._row = _normal(self._rng, _BLOCK), 0
+        noise, said = self._noise[self._row : self._row + 1], Readings.zeros()
         self._row += 1
-        readings = _readings(
-            self._bias, self._std, noise, euler_zyx_rad, nu_body, nu_relative_body, self._scale, self._datum_rad
+        _read(
+            said, self._bias, self._std, noise, euler_zyx_rad, nu_body, nu_relative_body, self._scale, self._datum_rad
         )
         return Proprioception(
             time_s=time_s,
-            depth_m=depth_m + float(readings[0]),
-            euler_zyx_rad=readings[1:4],
-            angular_velocity_rad_s=readings[4:7],
-            velocity_ground_m_s=readings[7:10],
-            velocity_water_m_s=readings[10:13],
+            depth_m=depth_m + float(said["depth_m"][0]),
+            euler_zyx_rad=said["euler_zyx_rad"][0],
+            angular_velocity_rad_s=said["angular_velocity_rad_s"][0],
+            velocity_ground_m_s=said["velocity_ground_m_s"][0],
+            velocity_water_m_s=said["velocity_water_m_s"][0],
             contact=switch_force_n > self._cfg.contact_threshold_n,
             latched=latched,
         )
 
 
+def _normal(rng: np.random.Generator, count: int) -> Records[Readings]:
+    """(count,) normal numbers for each channel."""
+    rows = rng.standard_normal((count, _CHANNELS)).view(Readings.dtype())[:, 0]
+    return cast("Records[Readings]", rows)
+
+
 @compiled
-def _readings(
-    bias: Array,
-    std: Array,
-    noise: Array,
+def _read(
+    said: Records[Readings],
+    bias: Records[Readings],
+    std: Records[Readings],
+    noise: Records[Readings],
     euler_zyx_rad: Array,
     nu_body: Array,
     nu_relative_body: Array,
     scale: float,
     datum_rad: float,
-) -> Array:
-    """(13,) error of the depth, and what the other sensors say: three each of angles, rates and both velocities."""
-    out = np.empty(13)
-    for i in range(13):
-        out[i] = bias[i] + std[i] * noise[i]
+) -> None:
+    """Write into `said` (1,) the error of the depth, and what the other sensors say."""
+    out, off, sigma, normal = said[0], bias[0], std[0], noise[0]
+    out.depth_m = off.depth_m + sigma.depth_m * normal.depth_m
     for i in range(3):
-        out[1 + i] += euler_zyx_rad[i]
-        out[4 + i] += nu_body[3 + i]
-        out[7 + i] += scale * nu_body[i]
-        out[10 + i] += scale * nu_relative_body[i]
-    out[3] = within_pi(out[3] + datum_rad)
-    return out
+        angle = off.euler_zyx_rad[i] + sigma.euler_zyx_rad[i] * normal.euler_zyx_rad[i]
+        out.euler_zyx_rad[i] = angle + euler_zyx_rad[i]
+        rate = off.angular_velocity_rad_s[i] + sigma.angular_velocity_rad_s[i] * normal.angular_velocity_rad_s[i]
+        out.angular_velocity_rad_s[i] = rate + nu_body[3 + i]
+        ground = off.velocity_ground_m_s[i] + sigma.velocity_ground_m_s[i] * normal.velocity_ground_m_s[i]
+        out.velocity_ground_m_s[i] = ground + scale * nu_body[i]
+        water = off.velocity_water_m_s[i] + sigma.velocity_water_m_s[i] * normal.velocity_water_m_s[i]
+        out.velocity_water_m_s[i] = water + scale * nu_relative_body[i]
+    out.euler_zyx_rad[2] = within_pi(out.euler_zyx_rad[2] + datum_rad)

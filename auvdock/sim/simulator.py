@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -15,17 +15,19 @@ from auvdock.core.limits import between
 from auvdock.core.stations import StationCfg
 from auvdock.core.transforms import make_transform, rotation_from_quat_wxyz
 from auvdock.core.vehicle import VehicleCfg, load_vehicle
-from auvdock.sim.actuation import Actuators
+from auvdock.numeric.records import Records
+from auvdock.sim.actuation import make_actuators
 from auvdock.sim.contacts import Contacts
 from auvdock.sim.dock import Weld
 from auvdock.sim.docks import make_dock
-from auvdock.sim.hydrodynamics import Hydrodynamics
-from auvdock.sim.immersion import Immersion
+from auvdock.sim.hydrodynamics import make_hull
+from auvdock.sim.immersion import clearance_m, cut_hull, immerse
+from auvdock.sim.kinematics import Kinematics, kinematics
 from auvdock.sim.mj import MjData, addresses, mujoco
 from auvdock.sim.ocean import CurrentCfg, Ocean
 from auvdock.sim.scene import LATCH, VEHICLE, build_model
 from auvdock.sim.sensors import SensorCfg, Sensors
-from auvdock.sim.stepping import MOTION, ROW, advance, is_absurd, keep, motion
+from auvdock.sim.stepping import FreeJoint, Run, Snapshot, advance, is_absurd, record
 from auvdock.sim.truth import Truth
 
 __all__ = ["HistoryEntry", "SimCfg", "Simulator"]
@@ -90,40 +92,40 @@ class Simulator:
         self.model = build_model(self.vehicle, self._dock, self._dt_s)
         self._data = mujoco.MjData(self.model)
         self.T_world_station = make_transform(np.eye(3), np.array([0.0, 0.0, -station.depth_m]))
-        self._actuators = Actuators(self.vehicle, self._dt_s)
-        self._hydrodynamics = Hydrodynamics(self.vehicle, self._actuators.thrusters)
+        self._actuators = make_actuators(self.vehicle, self._dt_s)
+        self._pieces = cut_hull(self.vehicle)
+        self._clearance_m = clearance_m(self._pieces, self._actuators)
+        self._hull = make_hull(self.vehicle, self._clearance_m)
         self._ocean = Ocean(cfg.current, station.depth_m, self._dt_s)
         self._sensors = Sensors(cfg.sensors)
         self._contacts = Contacts(self.model, self._data, self.vehicle.nose_x_m, self.vehicle.radius_m)
         self._weld = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_EQUALITY, LATCH)
         self._body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
-        hydrodynamics, watch = self._hydrodynamics, self._dock.watch
-        water = hydrodynamics.displaced_kg, hydrodynamics.buoyancy_n, self._dt_s
-        self._immersion = Immersion(self.vehicle)
-        above = self._immersion.clearance_m
-        self._constants = np.array([*water, watch.reach_m, *watch.normal_world, watch.offset_m, above, 0.0, 0.0, 0.0])
-        self._totals: Array = np.zeros(2)
-        self._ring: Array = np.zeros((_HISTORY_STEPS + 1, ROW + len(self.vehicle.actuators)))
+        self._history = Snapshot.zeros(_HISTORY_STEPS + 1)
+        self._commands: Array = np.zeros((_HISTORY_STEPS + 1, len(self._actuators)))
+        self._sensed = Kinematics.zeros()
+        self._shallow = False
         self._truth: Truth | None = None
-        self._moving: Array | None = None
         self._bind()
         self.reset(np.array(self._dock.free_world_m), np.array([0.0, 0.0, 0.0, 1.0]), np.random.default_rng(0))
 
     def _bind(self) -> None:
         """Views into MuJoCo's memory, so that the step need not look them up."""
         data = self._data
-        self._qpos, self._qvel = data.qpos, data.qvel
-        self._mass = data.M[:21]
-        self._xmat = data.xmat[self._body].reshape(3, 3)
-        self._applied = data.qfrc_applied[:6]
-        self._constraint = data.qfrc_constraint[:3]
-        self._addresses = addresses(self.model, data)
+        self._joint = FreeJoint(
+            *addresses(self.model, data),
+            qpos=data.qpos,
+            qvel=data.qvel,
+            rotation=data.xmat[self._body].reshape(3, 3),
+            mass=data.M[:21],
+            applied=data.qfrc_applied[:6],
+            constraint=data.qfrc_constraint[:3],
+        )
         self._contacts.bind(data)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the views."""
-        views = ("_qpos", "_qvel", "_mass", "_xmat", "_applied", "_constraint", "_addresses")
-        return {key: value for key, value in self.__dict__.items() if key not in views}
+        return {key: value for key, value in self.__dict__.items() if key != "_joint"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore the views too."""
@@ -133,7 +135,6 @@ class Simulator:
     @property
     def data(self) -> MjData:
         """MuJoCo's data, with poses of bodies, geoms, cameras and lights brought up to the present state."""
-        self._moving = None  # whoever holds the data may change it
         if self._poses_stale:
             mujoco.mj_kinematics(self.model, self._data)
             mujoco.mj_comPos(self.model, self._data)
@@ -171,25 +172,24 @@ class Simulator:
         nu = np.zeros(6) if nu_relative_body is None else nu_relative_body
         check_shape("nu_relative_body", nu, (6,))
         qpos = np.concatenate([position_world_m, quat_wxyz / length]).astype(np.float64)
-        if is_absurd(qpos, nu.astype(np.float64), qpos[:3]):
+        run = Run(self._dt_s, self._dock.watch, qpos[:3], 0, 0.0, 0.0).packed()
+        if is_absurd(qpos, nu.astype(np.float64), run):
             raise ValueError(f"cannot start at {position_world_m} with {nu}")
         water_rng, sensor_rng = rng.spawn(2)
         mujoco.mj_resetData(self.model, self._data)
         self._ocean.reset(current if current is not None else self.cfg.current, water_rng)
         self._sensors.reset(sensor_rng, compass_datum_rad)
-        self._actuators.reset()
+        self._actuators["state"] = 0.0
         self._dock.reset()
-        self._qpos[:] = qpos
-        self._constants[9:12] = qpos[:3]
-        self._qvel[:3] = self._ocean.velocity(float(qpos[2])) + rotation_from_quat_wxyz(qpos[3:]) @ nu[:3]
-        self._qvel[3:] = nu[3:]
-        self._steps = 0
+        self._joint.qpos[:] = qpos
+        self._joint.qvel[:3] = self._ocean.velocity(float(qpos[2])) + rotation_from_quat_wxyz(qpos[3:]) @ nu[:3]
+        self._joint.qvel[3:] = nu[3:]
         self._diverged = False
         self._contacts.reset()
-        self._totals[:] = 0.0
+        self._run = run
         self._broached_s = 0.0
         self._absurd: list[HistoryEntry] = []
-        keep(self._ring, 0, self._qpos, self._qvel)
+        record(self._history, 0, self._joint.qpos, self._joint.qvel)
         mujoco.mj_forward(self.model, self._data)
         self._poses_stale = False
         self._observe()
@@ -208,34 +208,22 @@ class Simulator:
         """
         if self._diverged:
             return
-        values = self._actuators.checked(command)
+        values = np.asarray(command, dtype=np.float64)
+        check_shape("command", values, (len(self._actuators),))
+        self._actuators["command"] = values
         while steps > 0 and not self._diverged:
-            moving = np.empty(MOTION)
-            immersion = self._immersion.of(self._qpos, self._qvel)
             noise = self._ocean.noise(steps)
+            self._immerse()
             made = advance(
-                *self._addresses,
+                self._joint,
                 min(steps, len(noise)) or steps,
-                self._steps,
-                self._qpos,
-                self._qvel,
-                self._xmat,
-                self._mass,
-                self._applied,
-                self._constraint,
-                values,
-                self._actuators.state,
-                self._actuators.table,
-                self._hydrodynamics.weights,
-                self._hydrodynamics.added,
-                self._ocean.current,
-                self._ocean.gust,
+                self._hull,
+                self._actuators,
+                self._ocean.water,
                 noise,
-                self._constants,
-                immersion,
-                self._totals,
-                self._ring,
-                moving,
+                self._run,
+                self._history,
+                self._commands,
             )
             if made < 0:
                 raise ValueError(f"command {-1 - made} is not a number")
@@ -244,12 +232,17 @@ class Simulator:
                 return
             self._ocean.used(made)
             self._poses_stale = True
-            self._steps += made
-            if immersion is not self._immersion.under and immersion[0] < 1.0:
+            if self._hull["immersed"][0] < 1.0:
                 self._broached_s += made * self._dt_s
             steps -= made
             self._contacts.update()
-            self._observe(moving)
+            self._observe()
+
+    def _immerse(self) -> None:
+        """Work out how much of the vehicle is under water now."""
+        was_shallow, self._shallow = self._shallow, self._joint.qpos[2] >= -self._clearance_m
+        if self._shallow or was_shallow:
+            immerse(self._joint.qpos, self._joint.qvel, self._pieces, self._hull, self._actuators)
 
     @property
     def time_s(self) -> float:
@@ -257,21 +250,29 @@ class Simulator:
         return self._steps * self._dt_s
 
     @property
+    def _steps(self) -> int:
+        """Made since reset."""
+        return int(self._run["steps"][0])
+
+    @property
     def truth(self) -> Truth:
         """A snapshot of the true state; its arrays are read-only, since callers between two steps share it."""
         if self._truth is not None:
             return self._truth
-        moving = self._motion()
+        moving = Kinematics.zeros()
+        self._kinematics(moving)
+        cast(Any, moving).setflags(write=False)
+        self._immerse()
         dock = self._dock.report()
         entry = dock.entry
         nose = np.array(dock.nose_station_m)
         nose.setflags(write=False)
         self._truth = Truth(
             time_s=self.time_s,
-            T_world_body=moving[:16].reshape(4, 4),
-            nu_body=moving[22:28],
-            nu_relative_body=moving[28:34],
-            current_world_m_s=moving[19:22],
+            T_world_body=moving["T_world_body"][0],
+            nu_body=moving["nu_body"][0],
+            nu_relative_body=moving["nu_relative_body"][0],
+            current_world_m_s=moving["water_world_m_s"][0],
             nose_station_m=nose,
             axis_angle_rad=dock.axis_angle_rad,
             contact_force_n=self._contacts.force_n,
@@ -283,9 +284,9 @@ class Simulator:
             entry_angle_rad=entry.angle_rad if entry else None,
             entry_lateral_m=entry.lateral_m if entry else None,
             entry_vertical_m=entry.vertical_m if entry else None,
-            energy_j=float(self._totals[0]),
-            path_length_m=float(self._totals[1]),
-            immersed_share=float(self._immersion.of(self._qpos, self._qvel)[0]),
+            energy_j=float(self._run["work_j"][0]),
+            path_length_m=float(self._run["path_m"][0]),
+            immersed_share=float(self._hull["immersed"][0]),
             broached_s=self._broached_s,
             diverged=self._diverged,
             landing=dock.landing,
@@ -294,39 +295,44 @@ class Simulator:
 
     def proprioception(self) -> Proprioception:
         """One noisy sample of the vehicle's own sensors; draws from the sensors' generator."""
-        moving, force_n = self._motion(), 0.0
+        moving, force_n = self._sensed, 0.0
+        self._kinematics(moving)
+        pose: Array = moving["T_world_body"][0]
         if self._contacts.force_n > 0.0:
-            pose = moving[:16].reshape(4, 4)
             force_n = self._dock.switch_force_n(self._contacts, pose[:3, 3], pose[:3, :3])
         return self._sensors.sample(
-            self.time_s, -float(moving[11]), moving[16:19], moving[22:28], moving[28:34], force_n, self._dock.latched
+            self.time_s,
+            -float(pose[2, 3]),
+            moving["euler_zyx_rad"][0],
+            moving["nu_body"][0],
+            moving["nu_relative_body"][0],
+            force_n,
+            self._dock.latched,
         )
 
-    def _motion(self) -> Array:
-        """`stepping.motion` of the present state, read-only."""
-        if self._moving is None:
-            self._moving = np.empty(MOTION)
-            motion(self._qpos, self._qvel, self._ocean.current, self._ocean.gust, self._moving)
-            self._moving.setflags(write=False)
-        return self._moving
+    def _kinematics(self, out: Records[Kinematics]) -> None:
+        """Write `kinematics` of the present state."""
+        kinematics(self._joint.qpos, self._joint.qvel, self._ocean.water, out)
 
     @property
     def history(self) -> list[HistoryEntry]:
         """The last 240 steps; once diverged, the absurd state is the last entry."""
         kept = min(self._steps, _HISTORY_STEPS - len(self._absurd))
-        rows = [self._ring[index % len(self._ring)].tolist() for index in range(self._steps - kept, self._steps)]
-        return [HistoryEntry(row[0] * self._dt_s, row[1:8], row[8:ROW], row[ROW:]) for row in rows] + self._absurd
+        entries: list[HistoryEntry] = []
+        for index in range(self._steps - kept, self._steps):
+            place = index % len(self._history)
+            row, command = Snapshot.read(self._history, place), self._commands[place].tolist()
+            entries.append(HistoryEntry(row.step * self._dt_s, row.qpos.tolist(), row.qvel.tolist(), command))
+        return entries + self._absurd
 
-    def _observe(self, moving: Array | None = None) -> None:
-        """Dock, latch and divergence after steps or a reset; `moving` is what `motion` says of the state."""
-        qpos: list[float] = self._qpos.tolist()
-        qvel: list[float] = self._qvel.tolist()
-        if is_absurd(self._qpos, self._qvel, self._constants[9:12]):
+    def _observe(self) -> None:
+        """Dock, latch and divergence after steps or a reset."""
+        qpos: list[float] = self._joint.qpos.tolist()
+        qvel: list[float] = self._joint.qvel.tolist()
+        if is_absurd(self._joint.qpos, self._joint.qvel, self._run):
             self._freeze([])
             return
-        if moving is not None:
-            moving.setflags(write=False)
-        self._truth, self._moving = None, moving
+        self._truth = None
         weld = self._dock.update(self.time_s, qpos, qvel, self._contacts)
         if weld is not None:
             self._close_latch(weld)
@@ -334,12 +340,12 @@ class Simulator:
     def _freeze(self, command: list[float]) -> None:
         """Mark as diverged and go back to the last sane state, so that nobody downstream meets a NaN."""
         self._diverged = True
-        self._absurd = [HistoryEntry(self.time_s, self._qpos.tolist(), self._qvel.tolist(), command)]
-        self._truth = self._moving = None
+        self._absurd = [HistoryEntry(self.time_s, self._joint.qpos.tolist(), self._joint.qvel.tolist(), command)]
+        self._truth = None
         # Either somebody wrote to the data since the last step, or that step went wrong, whose state was not kept.
         index = self._steps if command else self._steps - 1
-        row = self._ring[index % len(self._ring)]
-        self._qpos[:], self._qvel[:] = row[1:8], row[8:ROW]
+        row = Snapshot.read(self._history, index % len(self._history))
+        self._joint.qpos[:], self._joint.qvel[:] = row.qpos, row.qvel
         self._contacts.force_n = 0.0
 
     def _close_latch(self, weld: Weld) -> None:

@@ -19,6 +19,7 @@ here.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -62,6 +63,9 @@ class RotatingFacts(NamedTuple):
 
     Attributes:
         has_beacon: the station has a rotating beacon.
+        has_pose: confirmed, fresh poses of the array that agree with the beacon.
+        lamp: a fixed lamp is seen steadily where the station should be.
+        in_mode_s: time in this mode.
         fixes: accepted azimuth fixes, 0 without any.
         since_fix_s: time since the last one, infinite without.
         missed: a look for the beacon where it should be has failed.
@@ -69,22 +73,19 @@ class RotatingFacts(NamedTuple):
         off_axis_rad: magnitude of the vehicle's azimuth, infinite without a beacon.
         cone_rad: half angle of the cone before the mouth.
         ahead_m: camera before the mouth along the axis, at most: two standard deviations farther than believed.
-        has_pose: confirmed, fresh poses of the array that agree with the beacon.
-        lamp: a fixed lamp is seen steadily where the station should be.
-        in_mode_s: time in this mode.
     """
 
     has_beacon: bool
-    fixes: int
-    since_fix_s: float
-    missed: bool
-    range_share: float
-    off_axis_rad: float
-    cone_rad: float
-    ahead_m: float
     has_pose: bool
     lamp: bool
     in_mode_s: float
+    fixes: int = 0
+    since_fix_s: float = math.inf
+    missed: bool = False
+    range_share: float = math.inf
+    off_axis_rad: float = math.inf
+    cone_rad: float = 0.0
+    ahead_m: float = math.inf
 
 
 def next_rotating_mode(mode: str, facts: RotatingFacts, cfg: RotatingModeCfg) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from auvdock.controllers.axis_guidance import Place
 from auvdock.controllers.modes import ABORT, ACQUIRE, DOCKED, FAR, MID, next_mode
 from auvdock.controllers.pilot import ConicalPilot, ControlCfg, PilotState
 from auvdock.controllers.rotating.beacon_filter import BeaconFilter, BeaconState, Sighting
@@ -20,7 +22,7 @@ from auvdock.controllers.rotating.modes import (
 from auvdock.controllers.rotating.route import Leg, route
 from auvdock.controllers.rotating.steering import look_around, steer_course
 from auvdock.controllers.senses import Senses, Vector, cross, read_senses
-from auvdock.controllers.steering import Place, Steering
+from auvdock.controllers.steering import Steering
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, AzimuthFix, Bearing, Command, Percept, Proprioception
 from auvdock.core.station import ConicalStationCfg
@@ -77,13 +79,13 @@ class RotatingState(NamedTuple):
     """
 
     flight: PilotState
-    beacon: BeaconState | None
-    trail: tuple[Step, ...]
-    side: float
-    look_s: float | None
-    missed: bool
-    believed: bool
-    hunt: Hunt
+    beacon: BeaconState | None = None
+    trail: tuple[Step, ...] = ()
+    side: float = 0.0
+    look_s: float | None = None
+    missed: bool = False
+    believed: bool = False
+    hunt: Hunt = Hunt()
 
     @property
     def mode(self) -> str:
@@ -125,7 +127,7 @@ class RotatingPilot:
 
     def initial_state(self) -> RotatingState:
         """Searching, with nothing known."""
-        return RotatingState(self.conical.initial_state(), None, (), 0.0, None, False, False, Hunt())
+        return RotatingState(self.conical.initial_state())
 
     def step(
         self, state: RotatingState, percept: Percept | None, proprioception: Proprioception
@@ -155,8 +157,8 @@ class RotatingPilot:
             state = state._replace(hunt=self._watch(state, percept, senses))
         steering, state = self._steer(state, senses)
         command, flight = self.conical.act(state.flight, steering, place, senses)
-        self._log(command, state)
-        return command, state._replace(flight=flight)
+        state = state._replace(flight=flight)
+        return dataclasses.replace(command, setpoint=command.setpoint | self._believed(state)), state
 
     def _reckon(self, state: RotatingState, senses: Senses) -> RotatingState:
         """Dead reckoning of the camera in level compass axes."""
@@ -227,12 +229,9 @@ class RotatingPilot:
         )
         lamp = sight is not None and sight.frames >= self.cfg.rotating.modes.steady_sights
         lamp = lamp and self._trusts_lamp(state)
-        in_mode_s = senses.time_s - (flight.since_s or 0.0)
+        in_mode_s = senses.time_s - (flight.stage.since_s or 0.0)
         if beacon is None:
-            none = math.inf
-            return RotatingFacts(
-                self._beacon is not None, 0, none, False, none, none, 0.0, none, has_pose, lamp, in_mode_s
-            )
+            return RotatingFacts(has_beacon=self._beacon is not None, has_pose=has_pose, lamp=lamp, in_mode_s=in_mode_s)
         return RotatingFacts(
             has_beacon=self._beacon is not None,
             fixes=beacon.fixes,
@@ -272,7 +271,7 @@ class RotatingPilot:
         beacon = state.beacon
         if mode == ACQUIRE:
             anchor = beacon.bearing_rad if beacon is not None else senses.yaw_rad
-            flight = flight._replace(anchor_rad=anchor)
+            flight = flight._replace(stage=flight.stage._replace(anchor_rad=anchor))
             state = state._replace(believed=beacon is not None, hunt=Hunt())
         if mode in (FAR, MID, ABORT, DOCKED, ACQUIRE):
             state = state._replace(missed=False, look_s=None)
@@ -303,7 +302,7 @@ class RotatingPilot:
             speed = min(speed, max(0.2, 0.12 * (x - cfg.modes.min_blind_m + 2.0)))
             depth = beacon.beacon_depth_m + self._beacon_m[2]
         if math.sqrt(beacon.depth_variance_m2) > 1.5:
-            depth = flight.anchor_depth_m
+            depth = flight.stage.anchor_depth_m
         steering = steer_course(course, keep_in_view, speed, depth, senses, current, self.conical.reach_m_s, cfg.course)
         return steering, state
 
@@ -326,17 +325,14 @@ class RotatingPilot:
         return beacon.bearing_rad, state
 
     def _search(self, state: RotatingState, senses: Senses) -> Steering:
-        flight, cfg = state.flight, self.cfg.rotating
-        beacon = state.beacon
+        stage, beacon, cfg = state.flight.stage, state.beacon, self.cfg.rotating
         if beacon is not None and beacon.since_fix_s < cfg.modes.lineup_blind_s:
             # Found: wait for the next pass with the beacon in the middle of the image.
             return look_around(0.0, beacon.bearing_rad, senses.depth_m, 1.0, True, cfg.look)
         hunt = state.hunt
         if hunt.hold_s is not None:
-            return look_around(0.0, hunt.hold_rad, flight.anchor_depth_m, 1.0, True, cfg.look)
-        return look_around(
-            hunt.clock_s, flight.anchor_rad, flight.anchor_depth_m, flight.side, state.believed, cfg.look
-        )
+            return look_around(0.0, hunt.hold_rad, stage.anchor_depth_m, 1.0, True, cfg.look)
+        return look_around(hunt.clock_s, stage.anchor_rad, stage.anchor_depth_m, stage.side, state.believed, cfg.look)
 
     def _watch(self, state: RotatingState, percept: Percept | None, senses: Senses) -> Hunt:
         """Stop turning at the glimpse of a light: the next passes tell whether it is the beacon."""
@@ -360,16 +356,16 @@ class RotatingPilot:
         bearing, _ = self.conical.compass_direction(glimpse, senses)
         return hunt._replace(hold_s=senses.time_s, hold_rad=bearing) if math.isfinite(bearing) else hunt
 
-    def _log(self, command: Command, state: RotatingState) -> None:
+    def _believed(self, state: RotatingState) -> dict[str, float]:
         """What is believed of the beacon, for the log."""
         beacon = state.beacon
         if beacon is None:
-            return
+            return {}
         x, y = self._station_m(beacon)
-        command.setpoint.update(
-            station_x_m=x,
-            station_y_m=y,
-            range_sigma_m=beacon.range_sigma_m,
-            cross_sigma_m=beacon.cross_sigma_m,
-            azimuth_rad=beacon.azimuth_rad,
-        )
+        return {
+            "station_x_m": x,
+            "station_y_m": y,
+            "range_sigma_m": beacon.range_sigma_m,
+            "cross_sigma_m": beacon.cross_sigma_m,
+            "azimuth_rad": beacon.azimuth_rad,
+        }

@@ -79,14 +79,14 @@ def route(x_m: float, y_m: float, side: float, cfg: RouteCfg, caution_m: float =
     gate_x, gate_y = cfg.gate_m - x_m, -y_m
     gate = math.hypot(gate_x, gate_y)
     off = math.remainder(math.atan2(gate_y, gate_x) - sight, math.tau)
-    near = max(distance - caution_m, 0.0)
-    if near <= cfg.radius_m:
+    least = max(distance - caution_m, 0.0)
+    if least <= cfg.radius_m:
         tangent, free = 0.5 * math.pi, 0.0
-        outwards = min(0.9, cfg.push * (cfg.radius_m - near))
+        outwards = min(0.9, cfg.push * (cfg.radius_m - least))
     else:
-        tangent, outwards = math.asin(cfg.radius_m / near), 0.0
-        free = math.sqrt(near * near - cfg.radius_m * cfg.radius_m)
-    direct = abs(off) >= tangent + outwards or (near > cfg.radius_m and gate <= free)
+        tangent, outwards = math.asin(cfg.radius_m / least), 0.0
+        free = math.sqrt(least * least - cfg.radius_m * cfg.radius_m)
+    direct = abs(off) >= tangent + outwards or (least > cfg.radius_m and gate <= free)
     if direct:
         return Leg(sight + off, side, distance, gate, True)
     # Tangent, arc, tangent: the arc spans what is left of the angle between the two places.

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
 from auvdock.controllers.senses import Senses, Vector
-from auvdock.controllers.steering import Steering, ground_course
+from auvdock.controllers.steering import Line, Steering, ground_course
 from auvdock.core.checked import Checked
 from auvdock.core.limits import NotNegative, Positive, at_least
 
@@ -127,4 +127,4 @@ def steer_course(
         gap = abs(math.remainder(course_rad - senses.yaw_rad, math.tau))
         speed_m_s *= min(1.0, max(0.2, 1.6 - gap))
     setpoint, offset = ground_course(speed_m_s, 0.0, 0.0, course_rad, crab, senses, current_m_s, reach_m_s, view)
-    return Steering(setpoint._replace(depth_m=depth_m), offset_rad=offset)
+    return Steering(setpoint._replace(depth_m=depth_m), Line(offset_rad=offset))

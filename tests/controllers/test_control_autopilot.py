@@ -10,6 +10,7 @@ from control_bench import DT_S, VEHICLE, Boat
 
 from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotCfg, AutopilotSetpoint, AutopilotState
+from auvdock.controllers.control_law import LoopMemory
 from auvdock.controllers.linear_model import hydrodynamic_wrench
 from auvdock.core.contracts import Proprioception
 
@@ -91,7 +92,7 @@ def test_impossible_demands_do_not_wind_up():
 def test_feed_forward_balances_the_water_at_a_steady_speed(velocity):
     """Outside reference: the drag, lift and Munk moment of the linear model; the net weight acts along heave."""
     still, speed = np.zeros(3), np.array(velocity)
-    state = AutopilotState((*velocity, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), True)
+    state = AutopilotState(LoopMemory(speed, still, np.zeros(6), sampled=True).packed())
     setpoint = AutopilotSetpoint(velocity[0], velocity[1], velocity[2], 0.0, 0.0)
     wrench, after = AUTOPILOT.step(state, setpoint, Proprioception(0.0, 8.0, still, still, speed, speed))
     expected = -hydrodynamic_wrench(VEHICLE, np.array([*velocity, 0.0, 0.0, 0.0]))

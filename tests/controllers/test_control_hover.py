@@ -164,8 +164,8 @@ def test_station_is_kept_in_a_current_from_any_side(name, direction_deg):
     assert max(error[0] for error in errors) < 0.3
 
 
-def test_upset_vehicle_rights_itself_and_torpedo_state_has_no_roll():
-    assert len(Autopilot(VEHICLES["remus_hybrid"], HoverAutopilotCfg(), DT_S).initial_state().integrals) == 5
+def test_upset_vehicle_rights_itself_and_a_torpedo_has_no_roll_loop():
+    assert len(Autopilot(VEHICLES["remus_hybrid"], HoverAutopilotCfg(), DT_S).limits) == 5
     pilot = Autopilot(PUBLISHED, HoverAutopilotCfg(), DT_S)
     boat, state = Hoverer("bluerov2_heavy"), pilot.initial_state()
     allocator = ThrustAllocator(PUBLISHED, HoverAllocationCfg())

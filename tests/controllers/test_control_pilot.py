@@ -107,7 +107,8 @@ def test_same_input_gives_same_output_and_nothing_is_mutated():
 
 def test_mirrored_world_gives_mirrored_commands():
     """Two pilots, one fed through a mirror, over a whole docking in a cross-current."""
-    state = PILOT.initial_state()._replace(side=-1.0)
+    state = PILOT.initial_state()
+    state = state._replace(stage=state.stage._replace(side=-1.0))
     for senses, percept, command, _ in fly(start(current_m_s=0.2, direction_deg=70.0), 60.0):
         assert percept is not None
         mirrored, state = PILOT.step(state, mirror_percept(percept), mirror_senses(senses))
@@ -137,7 +138,7 @@ def test_goes_around_when_poses_jump_or_stay_away(spoil):
     boat = start(x=12.0)
     modes, backed, attempts = [], 0.0, 0
     for _, _, command, before in fly(boat, 60.0, spoil):
-        attempts = before.attempts
+        attempts = before.stage.attempts
         if not modes or modes[-1] != command.mode:
             modes.append(command.mode)
         if command.mode == "abort":

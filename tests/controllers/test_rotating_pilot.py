@@ -198,7 +198,18 @@ def test_whatever_comes_in_commands_stay_finite(sequence):
 
 
 def facts(**changes):
-    base = RotatingFacts(True, 5, 1.0, False, 0.1, 1.0, 0.14, 20.0, False, False, 5.0)
+    base = RotatingFacts(
+        has_beacon=True,
+        has_pose=False,
+        lamp=False,
+        in_mode_s=5.0,
+        fixes=5,
+        since_fix_s=1.0,
+        range_share=0.1,
+        off_axis_rad=1.0,
+        cone_rad=0.14,
+        ahead_m=20.0,
+    )
     return base._replace(**changes)
 
 

@@ -1,5 +1,6 @@
 """Kept code: whatever is wrong with it on disk, the function gives the right value and the user hears of it."""
 
+import collections
 import errno
 import importlib.util
 import os
@@ -7,7 +8,7 @@ import shutil
 import sys
 import warnings
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
@@ -81,6 +82,16 @@ def test_code_of_another_source_is_left_without_a_word(place):
     called(place, factor=2.5)
     # Only a constant of the file differs: the byte code is the same.
     assert called(place, factor=3.5)[1:] == (True, [])
+
+
+def test_code_follows_the_order_of_a_named_tuples_fields(place, monkeypatch):
+    text = "from auvdock.numeric.compiled import compiled\n@compiled\ndef first(pairs):\n    return pairs[1].first\n"
+    pairs = ModuleType("pairs")
+    monkeypatch.setitem(sys.modules, "pairs", pairs)
+    for fields, value in ((("first", "second"), 2.0), (("second", "first"), 3.0), (("first", "second"), 2.0)):
+        pair = collections.namedtuple("Pair", fields, module="pairs")  # pyright: ignore[reportUntypedNamedTuple]
+        monkeypatch.setattr(pairs, "Pair", pair, raising=False)
+        assert loaded(place, text).first((0.0, pair(2.0, 3.0))) == value
 
 
 @pytest.fixture

@@ -53,7 +53,7 @@ def test_quaternions_are_scipy_s(axis, angle):
         return
     rotation = Rotation.from_rotvec(np.array(axis) / size * angle)
     x, y, z, w = rotation.as_quat()
-    rows = np.array(rotation_of_quat_wxyz(w, x, y, z))
+    rows = np.array(rotation_of_quat_wxyz(np.array([w, x, y, z])))
     np.testing.assert_allclose(rows, rotation.as_matrix(), atol=1e-14)
     np.testing.assert_array_equal(rows, rotation_from_quat_wxyz(np.array([w, x, y, z])))
 

@@ -7,8 +7,8 @@ import pytest
 
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
+from auvdock.numeric.water import advance_gust
 from auvdock.sim.ocean import CurrentCfg, Ocean
-from auvdock.sim.stepping import blow
 
 
 def ocean(cfg: CurrentCfg, seed: int = 0, dt_s: float = 0.1) -> Ocean:
@@ -19,10 +19,9 @@ def ocean(cfg: CurrentCfg, seed: int = 0, dt_s: float = 0.1) -> Ocean:
 
 def step(water: Ocean, dt_s: float = 0.1) -> Array:
     """One step of the gusts; their acceleration."""
-    acceleration = np.zeros(2)
-    blow(water.current, water.noise(1)[0], dt_s, water.gust, acceleration)
+    advance_gust(water.water[0], water.noise(1)[0], dt_s)
     water.used(1)
-    return acceleration
+    return water.water["gust_m_s2"][0]
 
 
 @pytest.mark.parametrize(("direction_deg", "expected"), [(0.0, (0.4, 0.0)), (90.0, (0.0, 0.4)), (180.0, (-0.4, 0.0))])

@@ -15,15 +15,38 @@ from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import quat_wxyz_from_euler_zyx, rotation_from_quat_wxyz
 from auvdock.core.vehicle import HullPartCfg, VehicleCfg, load_vehicle
-from auvdock.sim.immersion import Immersion
+from auvdock.numeric.records import Records
+from auvdock.sim.actuation import Actuator, make_actuators
+from auvdock.sim.hydrodynamics import Hull, make_hull
+from auvdock.sim.immersion import Piece, clearance_m, cut_hull, immerse
 from auvdock.sim.simulator import Simulator
 
 BLUEROV = load_vehicle("bluerov2_heavy")
 SYMMETRIC = dataclasses.replace(REMUS, nose_x_m=0.665, tail_x_m=-0.665)
 """A torpedo whose hull has its middle where its data has the centre of buoyancy."""
 VEHICLES = {"remus": REMUS, "bluerov": BLUEROV}
-IMMERSIONS = {name: Immersion(vehicle) for name, vehicle in VEHICLES.items()}
 ANGLES = st.floats(-math.pi, math.pi)
+
+
+class Immersion:
+    """A vehicle's parts, and what of them is under water at a pose and a velocity."""
+
+    def __init__(self, vehicle: VehicleCfg) -> None:
+        self.pieces: Records[Piece] = cut_hull(vehicle)
+        self.actuators: Records[Actuator] = make_actuators(vehicle, 0.01)
+        self.clearance_m = clearance_m(self.pieces, self.actuators)
+        self.parts: Records[Hull] = make_hull(vehicle, self.clearance_m)
+
+    def of(self, place: Array, velocity: Array) -> Hull:
+        immerse(place, velocity, self.pieces, self.parts, self.actuators)
+        return Hull.read(self.parts.copy())
+
+    def shares(self, place: Array) -> list[float]:
+        """Of the hull and of each actuator."""
+        return [self.of(place, np.zeros(6)).immersed, *self.actuators["immersed"].tolist()]
+
+
+IMMERSIONS = {name: Immersion(vehicle) for name, vehicle in VEHICLES.items()}
 
 
 def pose(height_m: float, roll: float = 0.0, pitch: float = 0.0) -> Array:
@@ -52,12 +75,13 @@ def test_the_immersed_share_falls_from_one_to_nothing_as_the_hull_rises(
     name: str, height: float, step: float, roll: float, pitch: float
 ) -> None:
     immersion = IMMERSIONS[name]
-    low = immersion.of(pose(height, roll, pitch), np.zeros(6)).copy()
-    high = immersion.of(pose(height + step, roll, pitch), np.zeros(6)).copy()
-    for one, other in zip(low[[0, *range(5, len(low))]], high[[0, *range(5, len(high))]], strict=True):
+    low, high = immersion.shares(pose(height, roll, pitch)), immersion.shares(pose(height + step, roll, pitch))
+    for one, other in zip(low, high, strict=True):
         assert 0.0 <= other <= one + 1e-12 <= 1.0 + 2e-12
     if height < -immersion.clearance_m:
-        assert low.tolist() == [1.0, 0.0, 0.0, 0.0, 0.0] + [1.0] * (len(low) - 5)
+        assert low == [1.0] * len(low)
+        deep = immersion.of(pose(height, roll, pitch), np.zeros(6))
+        assert (deep.growth_1_s, deep.moment_m.tolist()) == (0.0, [0.0, 0.0, 0.0])
     if height > immersion.clearance_m:
         assert low[0] < 1e-12
 
@@ -77,9 +101,9 @@ def test_share_and_moment_are_those_of_the_immersed_volume(vehicle: VehicleCfg) 
         under = heights < 0.0
         got = immersion.of(place, np.zeros(6))
         level_torpedo = vehicle is SYMMETRIC and trial < 8
-        assert got[0] == pytest.approx(under.mean(), abs=0.008 if level_torpedo else 0.035)
+        assert got.immersed == pytest.approx(under.mean(), abs=0.008 if level_torpedo else 0.035)
         moment = points[under].sum(axis=0) / len(points)
-        np.testing.assert_allclose(got[2:5], moment, atol=0.035 * extent)
+        np.testing.assert_allclose(got.moment_m, moment, atol=0.035 * extent)
 
 
 @pytest.mark.parametrize("name", VEHICLES)
@@ -95,15 +119,15 @@ def test_growth_is_the_derivative_of_the_share(name: str) -> None:
             w, v = place[3], place[4:]
             turned = np.concatenate([[w - 0.5 * v @ spin], v + 0.5 * (w * spin + np.cross(v, spin))])
             moved = np.concatenate([place[:3] + sign * dt * rate[:3], turned / np.linalg.norm(turned)])
-            shares.append(float(immersion.of(moved, rate)[0]))
+            shares.append(immersion.of(moved, rate).immersed)
         slope = (shares[1] - shares[0]) / (2.0 * dt)
-        assert immersion.of(place, rate)[1] == pytest.approx(max(0.0, slope), abs=1e-5)
+        assert immersion.of(place, rate).growth_1_s == pytest.approx(max(0.0, slope), abs=1e-5)
 
 
 def test_the_torpedos_volume_has_its_middle_in_the_centre_of_buoyancy() -> None:
     pieces = IMMERSIONS["remus"].pieces
-    np.testing.assert_allclose(pieces[:, 4] @ pieces[:, :3], 0.0, atol=1e-12)
-    assert pieces[:, 4].min() > 0.0
+    np.testing.assert_allclose(pieces["weight"] @ pieces["place_m"], 0.0, atol=1e-12)
+    assert pieces["weight"].min() > 0.0
 
 
 def test_a_hull_beside_its_centre_of_buoyancy_is_refused() -> None:
@@ -137,11 +161,11 @@ def energy_j(sim: Simulator, immersion: Immersion) -> float:
     mass = vehicle.rigid_body_mass_body + truth.immersed_share * vehicle.added_mass_body
     up = rotation_from_quat_wxyz(qpos[3:])[2]
     pieces = immersion.pieces
-    t = (qpos[2] + pieces[:, :3] @ up) / pieces[:, 3]
+    t = (qpos[2] + pieces["place_m"] @ up) / pieces["radius_m"]
     inside = np.clip(t, -1.0, 1.0)
     chord = np.sqrt(1.0 - inside**2)
     lifted = (chord - inside * np.arccos(inside) - chord**3 / 3.0) / math.pi + np.maximum(0.0, -1.0 - t)
-    buoyancy = vehicle.buoyancy_n * float(pieces[:, 4] @ (pieces[:, 3] * lifted))
+    buoyancy = vehicle.buoyancy_n * float(pieces["weight"] @ (pieces["radius_m"] * lifted))
     height = qpos[2] + up @ vehicle.centre_of_gravity_body_m
     nu = truth.nu_relative_body
     return 0.5 * float(nu @ mass @ nu) + vehicle.mass_kg * 9.81 * float(height) + buoyancy
