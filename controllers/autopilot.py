@@ -10,11 +10,11 @@ import numpy as np
 
 from auvdock.controllers.control_law import body_wrench, near
 from auvdock.controllers.gains import AutopilotGains, DesignCfg, design_gains
-from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import ConfigError, located
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.estimation.senses import Senses, Vector, read_senses
 
 __all__ = ["Autopilot", "AutopilotCfg", "AutopilotSetpoint", "AutopilotState"]
 

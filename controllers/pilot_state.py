@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from auvdock.controllers.autopilot import AutopilotState
-from auvdock.controllers.relative_state import RelativeState
 from auvdock.controllers.steering import Sight
+from auvdock.estimation.relative_state import RelativeState
 
 __all__ = ["PilotState"]
 

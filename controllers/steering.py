@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
 from auvdock.controllers.guidance import GuidanceCfg, axis_course, crabbed
-from auvdock.controllers.senses import Senses, Vector
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
+from auvdock.estimation.senses import Senses, Vector
 
 __all__ = [
     "Place",

@@ -97,9 +97,10 @@ from auvdock.envs.options import check_options, reward_settings, world_settings
 from auvdock.envs.reward import RewardCfg
 from auvdock.envs.vehicle_env import VehicleEnv, box
 from auvdock.envs.vehicle_world import Sensed
+from auvdock.estimation.landing.estimator import LandingEstimator
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.perception.detectors import make_detector
 from auvdock.perception.landing.config import LandingPerceptionCfg
-from auvdock.perception.landing.pipeline import LandingPercept, LandingPerception
 from auvdock.perception.landing.tag_detectors import make_tag_detector
 from auvdock.sim.truth import Truth
 
@@ -135,7 +136,7 @@ class LandingEnv(VehicleEnv):
         self._world = LandingWorld(self.cfg, perception.detector, perception.tag_detector)
         self._detector = make_detector(perception.detector)
         self._tag_detector = make_tag_detector(perception.tag_detector, (self.cfg.station.tag.tag_id,))
-        self._perception = LandingPerception(perception, self._world.camera, self.cfg.station)
+        self._perception = LandingEstimator(perception, self._world.camera, self.cfg.station)
         self._percept: LandingPercept | None = None
         self._seat = np.append(self._world.simulator.vehicle.seat_body_m, 1.0)
         super().__init__(self._world, observation, self.cfg, reward_settings(reward), render_mode, render_camera)

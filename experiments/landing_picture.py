@@ -17,7 +17,7 @@ from auvdock.episode.config import landing_level_cfg
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
 from auvdock.episode.trace import EpisodeSetup, Tick
-from auvdock.perception.landing.pipeline import LandingPercept
+from auvdock.estimation.landing.percept import LandingPercept
 
 __all__ = ["LandingAlbum", "main"]
 

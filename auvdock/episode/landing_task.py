@@ -13,8 +13,8 @@ from auvdock.envs.vehicle_world import Sensed
 from auvdock.episode.config import LandingEpisodeCfg
 from auvdock.episode.landing_metrics import LandingMetrics
 from auvdock.episode.result import stage_of
+from auvdock.estimation.landing.estimator import LandingEstimator
 from auvdock.perception.detectors import make_detector
-from auvdock.perception.landing.pipeline import LandingPerception
 from auvdock.perception.landing.tag_detectors import make_tag_detector
 
 __all__ = ["LandingTask"]
@@ -51,7 +51,7 @@ class LandingTask:
             find_pilot(cfg.control.controller)  # before the world, whose loops may have to be compiled
         self.world = LandingWorld(cfg.world, self.detector, cfg.perception.tag_detector)
         vehicle, camera = self.world.simulator.vehicle, self.world.camera
-        self._perception = LandingPerception(cfg.perception, camera, self.station)
+        self._perception = LandingEstimator(cfg.perception, camera, self.station)
         # It reads more of a percept than other pilots do; `perceive` gives it no other.
         own = cast(PilotFactory, LandingPilot)
         dt_s = 1.0 / cfg.world.control_hz

@@ -10,9 +10,8 @@ from auvdock.controllers.gains import DesignCfg
 from auvdock.controllers.landing.guidance import LandingGuidanceCfg
 from auvdock.controllers.landing.modes import LandingModeCfg
 from auvdock.controllers.landing.search import SpiralCfg
-from auvdock.controllers.relative_state import FilterCfg
 
-__all__ = ["HoverAllocationCfg", "HoverAutopilotCfg", "HoverDesignCfg", "HoverFilterCfg", "LandingControlCfg"]
+__all__ = ["HoverAllocationCfg", "HoverAutopilotCfg", "HoverDesignCfg", "LandingControlCfg"]
 
 
 @dataclass(frozen=True)
@@ -54,20 +53,6 @@ class HoverAllocationCfg(AllocationCfg):
 
 
 @dataclass(frozen=True)
-class HoverFilterCfg(FilterCfg):
-    """Relative filter over a few metres, where poses are good to a centimetre and dead reckoning to millimetres."""
-
-    position_walk_m_rs: float = 0.006
-    """Dead reckoning: a DVL of 3 mm/s at 20 Hz makes 0.7 mm/√s, its scale error and the compass a few more."""
-    heading_walk_rad_rs: float = 0.002
-    """The bearing of the station's axis."""
-    position_floor_m: float = 0.005
-    """Added to a measured position's standard deviation."""
-    rotation_floor_rad: float = 0.015
-    """Added to a measured rotation's standard deviation: inclinometer, compass and the station's own tilt."""
-
-
-@dataclass(frozen=True)
 class LandingControlCfg:
     """Settings of the landing pilot."""
 
@@ -75,8 +60,9 @@ class LandingControlCfg:
     """Loops and their limits."""
     allocation: HoverAllocationCfg = HoverAllocationCfg()
     """Wrench to actuators."""
-    filter: HoverFilterCfg = HoverFilterCfg()
-    """Relative state."""
+    position_walk_m_rs: float = 0.006
+    """Dead reckoning without a pose: standard deviation after 1 s, growing with the square root of time. A DVL of
+    3 mm/s at 20 Hz makes 0.7 mm/√s, its scale error and the compass a few more."""
     guidance: LandingGuidanceCfg = LandingGuidanceCfg()
     """Speeds, corridor, station keeping."""
     search: SpiralCfg = SpiralCfg()

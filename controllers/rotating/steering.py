@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
-from auvdock.controllers.senses import Senses, Vector
 from auvdock.controllers.steering import Steering, ground_course
 from auvdock.core.errors import ConfigError
+from auvdock.estimation.senses import Senses, Vector
 
 __all__ = ["CourseCfg", "LookAroundCfg", "look_around", "steer_course"]
 

@@ -18,7 +18,7 @@ from auvdock.core.contracts import Bearing, Detections, PoseEstimate
 from auvdock.core.landing_station import load_landing_station
 from auvdock.core.marine import flip_vector
 from auvdock.core.transforms import invert, make_transform
-from auvdock.perception.landing.pipeline import LandingPercept
+from auvdock.estimation.landing.percept import LandingPercept
 
 STATION = load_landing_station()
 OPEN_WATER_M = np.array([30.0, 0.0, -STATION.depth_m])

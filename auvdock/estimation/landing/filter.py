@@ -8,7 +8,7 @@ errors. Between frames p moves with the ground velocity of the DVL (trapezoid ru
     ṗ = R_station_body (v + ω × r_camera),    ψ̇ = (q sin φ + r cos φ) / cos θ.
 
 A level's pose of the pixels alone (`LevelPose.pull`, `.information`) is the measurement; the attitude prior that
-steadied its solution is not counted twice.
+steadied its solution is not counted twice. The filter's own arithmetic is filterpy's.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
 
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
@@ -34,7 +35,6 @@ from auvdock.perception.landing.level import LevelPose, pose_offset
 
 __all__ = ["LandingFilter"]
 
-_WIDE_M2 = 1e4
 _CORRELATION_S = 2.0
 """For how long a constant error of DVL and gyroscopes acts before a measurement takes its effect out again."""
 
@@ -42,123 +42,111 @@ _CORRELATION_S = 2.0
 class LandingFilter:
     """State, covariance and the last proprioception; empty until `start` or `place`."""
 
-    def __init__(self, cfg: FilterCfg, attitude: AttitudeCfg, camera: Camera, station_yaw_rad: float) -> None:
-        """Precompute for one camera and station."""
+    def __init__(self, cfg: FilterCfg, attitude: AttitudeCfg, camera: Camera) -> None:
+        """Precompute for one camera."""
         self._cfg = cfg
         self._body_camera = np.ascontiguousarray(camera.T_body_camera[:3, :3])
         self._arm_m = np.ascontiguousarray(camera.T_body_camera[:3, 3])
-        self._station_yaw = station_yaw_rad
         self._tilt_noise = math.radians(attitude.tilt_noise_deg) ** 2
         self._tilt_bias = math.radians(attitude.tilt_bias_deg) ** 2
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
-        self._state: Array | None = None
-        self._covariance: Array = np.zeros((6, 6))
+        self._kalman: _Kalman | None = None
         self._last: Proprioception | None = None
-        self._ahead: tuple[Proprioception, Array | None, Array] | None = None
-        """What `expected` found for a sample, until the state changes: `predict` is asked for the same."""
 
     @property
     def running(self) -> bool:
         """Whether there is a state."""
-        return self._state is not None
-
-    def attitude(self, proprioception: Proprioception) -> Array:
-        """(3, 3) R_station_camera by inclinometer (less its known error) and the best heading there is."""
-        if self._state is not None:
-            return self._transform(self._state, proprioception)[:3, :3]
-        roll, pitch, yaw = proprioception.euler_zyx_rad.tolist()
-        return rotation_from_euler_zyx(roll, pitch, yaw - self._station_yaw) @ self._body_camera
-
-    def measured_attitude(self, proprioception: Proprioception) -> Array:
-        """(3, 3) R_station_camera by inclinometer and compass alone."""
-        roll, pitch, yaw = proprioception.euler_zyx_rad.tolist()
-        return rotation_from_euler_zyx(roll, pitch, yaw - self._station_yaw) @ self._body_camera
+        return self._kalman is not None
 
     def predict(self, proprioception: Proprioception) -> None:
-        """Move the state on to the time of a sample."""
+        """Move the state on to the time of a sample; the same sample again changes nothing."""
         last, self._last = self._last, proprioception
-        ahead, self._ahead = self._ahead, None
-        if self._state is None or last is None:
-            return
-        if ahead is not None and ahead[0] is proprioception:
-            _, self._state, self._covariance = ahead
+        kalman = self._kalman
+        if kalman is None or last is None:
             return
         dt = proprioception.time_s - last.time_s
         if dt <= 0.0:
             return
-        moved = self._moved(self._state, last, proprioception, dt)
-        self._covariance = self._spread(last, proprioception, moved - self._state, dt)
-        self._state = moved
+        moved = self._moved(kalman.x, last, proprioception, dt)
+        step = moved - kalman.x
+        # A heading error turns the step.
+        kalman.F[0, 3], kalman.F[1, 3] = -float(step[1]), float(step[0])
+        kalman.Q = self._process(proprioception, dt)
+        kalman.predict(moved)
 
     def expected(self, proprioception: Proprioception) -> tuple[Array, Array] | None:
-        """(pose (4, 4), covariance (6, 6)) that `predict` would give, the filter left as it is; None while empty."""
-        if self._state is None or self._last is None:
-            return None
-        before = self._state, self._covariance, self._last
+        """Move the state on to the time of a sample: the pose (4, 4) there and its covariance (6, 6), None if empty."""
         self.predict(proprioception)
-        answer = self.pose(proprioception)
-        ahead = proprioception, self._state, self._covariance
-        self._state, self._covariance, self._last = before
-        self._ahead = ahead
-        return answer
+        return self.pose(proprioception) if self._kalman is not None else None
 
     def pose(self, proprioception: Proprioception) -> tuple[Array, Array]:
         """(T_station_camera (4, 4), covariance (6, 6)) at the sample to which the state was moved."""
-        state = self._state
-        if state is None:
-            raise ValueError("the filter holds no state yet")
-        T = self._transform(state, proprioception)
-        by_state, by_noise = self._jacobians(state, proprioception, T[:3, :3])
-        covariance = by_state @ self._covariance @ by_state.T + self._tilt_noise * (by_noise @ by_noise.T)
+        kalman = self._running()
+        T = self._transform(kalman.x, proprioception)
+        by_state, by_noise = self._jacobians(kalman.x, T[:3, :3])
+        covariance = by_state @ kalman.P @ by_state.T + self._tilt_noise * (by_noise @ by_noise.T)
         return T, 0.5 * (covariance + covariance.T)
 
     def distance2(self, level: LevelPose, proprioception: Proprioception) -> float:
         """Squared Mahalanobis distance of a level's pose from the state."""
-        innovation, by_state, noise = self._innovation([level], proprioception)
-        spread = by_state @ self._covariance @ by_state.T + noise
+        pull, expected, by_state, noise = self._measurement([level], proprioception)
+        innovation, spread = pull - expected, by_state @ self._running().P @ by_state.T + noise
         weighed = solve_positive(spread, innovation)
         return math.inf if weighed is None else float(innovation @ weighed)
 
     def update(self, levels: Sequence[LevelPose], proprioception: Proprioception) -> None:
         """Correct the state by one or two levels of the same frame; they share the inclinometer's noise."""
-        if self._state is None or not levels:
-            return
-        innovation, by_state, noise = self._innovation(levels, proprioception)
-        spread = by_state @ self._covariance @ by_state.T + noise
-        gain = np.linalg.solve(spread, by_state @ self._covariance).T
-        self._ahead = None
-        self._state = self._state + gain @ innovation
-        self._state[3] = wrap_angle(float(self._state[3]))
-        kept = np.eye(6) - gain @ by_state
-        covariance = kept @ self._covariance @ kept.T + gain @ noise @ gain.T
-        self._covariance = 0.5 * (covariance + covariance.T)
+        kalman = self._running()
+        pull, expected, by_state, noise = self._measurement(levels, proprioception)
+        kalman.update(pull, lambda _: by_state, lambda _: expected, noise)
+        self._settle(kalman, kalman.x)
 
     def start(self, levels: Sequence[LevelPose], proprioception: Proprioception) -> None:
-        """Begin with the levels of one frame: no knowledge of position and heading before them."""
+        """Begin with the levels of one frame: no knowledge of position and heading before them.
+
+        P⁻¹ = Hᵀ R⁻¹ H + Λ, Λ the inclinometer's alignment: a wide covariance to begin with would cost the digits of P.
+        """
         first = levels[0].T_station_camera
         yaw = euler_zyx_from_rotation(first[:3, :3] @ self._body_camera.T)[2]
-        self._state = np.array([*first[:3, 3].tolist(), yaw, 0.0, 0.0])
-        self._covariance = np.diag([_WIDE_M2] * 3 + [1.0] + [self._tilt_bias] * 2)
-        self._last, self._ahead = proprioception, None
-        self.update(levels, proprioception)
+        kalman = self._begin(np.array([*first[:3, 3].tolist(), yaw, 0.0, 0.0]), np.zeros((6, 6)), proprioception)
+        pull, expected, by_state, noise = self._measurement(levels, proprioception)
+        weighed = np.linalg.solve(noise, by_state)
+        known = np.diag([0.0] * 4 + [1.0 / self._tilt_bias] * 2)
+        kalman.P = np.linalg.inv(by_state.T @ weighed + known)
+        self._settle(kalman, kalman.x + kalman.P @ (weighed.T @ (pull - expected)))
 
     def place(self, T_station_camera: Array, covariance: Array, proprioception: Proprioception) -> None:
         """Take a pose as it is: what bare weighted fusion does with each frame."""
         roll, pitch, yaw = euler_zyx_from_rotation(T_station_camera[:3, :3] @ self._body_camera.T)
         measured = proprioception.euler_zyx_rad
         state = np.array([*T_station_camera[:3, 3].tolist(), yaw, measured[0] - roll, measured[1] - pitch])
-        by_state, _ = self._jacobians(state, proprioception, T_station_camera[:3, :3])
-        back = np.linalg.inv(by_state)
-        self._state, self._last, self._ahead = state, proprioception, None
-        self._covariance = back @ covariance @ back.T
+        back = np.linalg.inv(self._jacobians(state, T_station_camera[:3, :3])[0])
+        self._begin(state, back @ covariance @ back.T, proprioception)
+
+    def _begin(self, state: Array, covariance: Array, proprioception: Proprioception) -> _Kalman:
+        self._kalman = kalman = _Kalman(dim_x=6, dim_z=6)
+        kalman.x, kalman.P = state, covariance
+        self._last = proprioception
+        return kalman
+
+    @staticmethod
+    def _settle(kalman: _Kalman, state: Array) -> None:
+        """Take a state, its heading within ±π, and make P symmetric."""
+        state[3] = wrap_angle(float(state[3]))
+        kalman.x, kalman.P = state, 0.5 * (kalman.P + kalman.P.T)
+
+    def _running(self) -> _Kalman:
+        if self._kalman is None:
+            raise ValueError("the filter holds no state yet")
+        return self._kalman
 
     def _transform(self, state: Array, proprioception: Proprioception) -> Array:
         return make_transform(_R_station_body(state, proprioception) @ self._body_camera, state[:3])
 
-    def _jacobians(self, state: Array, proprioception: Proprioception, rotation: Array) -> tuple[Array, Array]:
+    def _jacobians(self, state: Array, rotation: Array) -> tuple[Array, Array]:
         """d(error coordinates of the pose) / d(state) (6, 6) and / d(noise of roll, pitch) (6, 2)."""
         yaw = float(state[3])
         about_yaw = rotation[2]
@@ -169,22 +157,23 @@ class LandingFilter:
         by_state[3:, 3], by_state[3:, 4], by_state[3:, 5] = about_yaw, -about_roll, -about_pitch
         return by_state, by_state[:, 4:]
 
-    def _innovation(self, levels: Sequence[LevelPose], proprioception: Proprioception) -> tuple[Array, Array, Array]:
-        """(6 k,) measured less expected error coordinates, their (6 k, 6) Jacobian and (6 k, 6 k) noise."""
-        state = self._state
-        if state is None:
-            raise ValueError("the filter holds no state yet")
-        expected = self._transform(state, proprioception)
+    def _measurement(
+        self, levels: Sequence[LevelPose], proprioception: Proprioception
+    ) -> tuple[Array, Array, Array, Array]:
+        """Error coordinates of k levels, measured and expected (6 k,), their Jacobian (6 k, 6) and noise (6 k, 6 k)."""
+        state = self._running().x
+        T = self._transform(state, proprioception)
         k = len(levels)
-        innovation, by_state = np.empty(6 * k), np.empty((6 * k, 6))
+        expected, by_state = np.empty(6 * k), np.empty((6 * k, 6))
         tilt, noise = np.empty((6 * k, 2)), np.zeros((6 * k, 6 * k))
         for index, level in enumerate(levels):
             rows = slice(6 * index, 6 * index + 6)
-            innovation[rows] = level.pull - pose_offset(level.T_station_camera, expected)
-            by_state[rows], tilt[rows] = self._jacobians(state, proprioception, level.T_station_camera[:3, :3])
+            expected[rows] = pose_offset(level.T_station_camera, T)
+            by_state[rows], tilt[rows] = self._jacobians(state, level.T_station_camera[:3, :3])
             trace = float(np.trace(level.information))
             noise[rows, rows] = np.linalg.inv(level.information + 1e-9 * trace / 6.0 * np.eye(6))
-        return innovation, by_state, noise + self._tilt_noise * (tilt @ tilt.T)
+        pull = np.concatenate([level.pull for level in levels])
+        return pull, expected, by_state, noise + self._tilt_noise * (tilt @ tilt.T)
 
     def _moved(self, state: Array, last: Proprioception, now: Proprioception, dt: float) -> Array:
         moved = state.copy()
@@ -198,24 +187,23 @@ class LandingFilter:
         body = sample.velocity_ground_m_s + cross(sample.angular_velocity_rad_s, self._arm_m)
         return _R_station_body(state, sample) @ body
 
-    def _spread(self, last: Proprioception, now: Proprioception, moved: Array, dt: float) -> Array:
-        """F P Fᵀ + Q."""
+    def _process(self, now: Proprioception, dt: float) -> Array:
+        """(6, 6) Q, what a step adds to the covariance."""
         cfg = self._cfg
-        across, along = -float(moved[1]), float(moved[0])
-        by_state = np.eye(6)
-        # A heading error turns the step.
-        by_state[0, 3], by_state[1, 3] = across, along
-        covariance = by_state @ self._covariance @ by_state.T
         speed2 = float(now.velocity_ground_m_s @ now.velocity_ground_m_s)
         # The trapezoid shares each sample between two steps, so the white error of a step is one sample's.
         step = (cfg.velocity_noise_m_s**2 + 0.5 * cfg.gyro_noise_rad_s**2 * float(self._arm_m @ self._arm_m)) * dt * dt
         step += cfg.velocity_scale_error**2 * speed2 * dt * _CORRELATION_S
         turn = cfg.gyro_noise_rad_s**2 * dt * dt + cfg.gyro_bias_rad_s**2 * dt * _CORRELATION_S
-        covariance[0, 0] += step
-        covariance[1, 1] += step
-        covariance[2, 2] += step
-        covariance[3, 3] += turn
-        return covariance
+        return np.diag([step, step, step, turn, 0.0, 0.0])
+
+
+class _Kalman(ExtendedKalmanFilter):
+    """filterpy's filter with a motion that is no matrix product."""
+
+    def predict_x(self, u: Array) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Take the moved state (6,), as `LandingFilter` works it out."""
+        self.x = u
 
 
 def _R_station_body(state: Array, sample: Proprioception) -> Array:

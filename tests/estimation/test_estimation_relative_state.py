@@ -7,13 +7,18 @@ import math
 
 import numpy as np
 import pytest
-from control_bench import CAMERA, DT_S
 
-from auvdock.controllers.relative_state import FilterCfg, RelativeFilter
-from auvdock.controllers.senses import read_senses
+from auvdock.core.camera import CameraCfg, make_camera
 from auvdock.core.contracts import PoseEstimate, Proprioception
+from auvdock.core.marine import flip_vector
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
+from auvdock.core.vehicle import load_vehicle
+from auvdock.estimation.relative_state import FilterCfg, RelativeFilter
+from auvdock.estimation.senses import read_senses
 
+BOW = load_vehicle("remus_hybrid").bow_camera
+CAMERA = make_camera(CameraCfg(), *(flip_vector(np.array(part)) for part in (BOW.position_m, BOW.direction, BOW.up)))
+DT_S = 1.0 / 30.0
 CFG = FilterCfg()
 TARGET = (-1.13, 0.0, 0.0)
 FILTER = RelativeFilter(CFG, CAMERA.T_body_camera, DT_S, target_m=TARGET)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from auvdock.controllers.relative_update import _fused, _move
+from auvdock.estimation.relative_update import _fused, _move
 
 
 def spread(rng, size):

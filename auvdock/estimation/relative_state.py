@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.controllers.relative_update import ACCEPTED, LEFT_OUT, REFUSED, relative_period
-from auvdock.controllers.senses import Senses, Vector
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import PoseEstimate
 from auvdock.core.errors import ConfigError
+from auvdock.estimation.relative_update import ACCEPTED, LEFT_OUT, REFUSED, relative_period
+from auvdock.estimation.senses import Senses, Vector
 
 __all__ = ["FilterCfg", "RelativeFilter", "RelativeState"]
 
