@@ -105,7 +105,7 @@ def test_the_same_sample_again_moves_nothing():
 
 
 def test_two_levels_at_once_and_one_after_the_other_say_the_same():
-    """The filter begun with both, against the filter begun with one that takes in the other; tilt known but for bias."""
+    """The filter begun with both, against that begun with one which takes in the other; no noise of tilt."""
     rng = np.random.default_rng(5)
     flight = Descent(np.array([0.1, 0.1, 2.4]), 0.1, 2.4)
     T, own = flight.camera(0.0), Senses(flight, rng).proprioception(0.0)
