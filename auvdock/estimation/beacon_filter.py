@@ -25,8 +25,6 @@ __all__ = ["BeaconFilter", "BeaconFilterCfg", "BeaconState", "Hypothesis", "Sigh
 
 _POSE_SIGMA_RAD = 0.02
 """Standard deviation of the axis that the array's poses leave behind (ours)."""
-_WAY = -np.eye(3, 2)
-"""B: the beacon's place moves against the vehicle's way."""
 
 
 @dataclass(frozen=True)
@@ -311,8 +309,9 @@ def _update(
 ) -> tuple[float, float, Hypothesis]:
     """One filter's squared Mahalanobis distance, log likelihood and posterior with its old weight."""
     kalman = ExtendedKalmanFilter(dim_x=3, dim_z=2)
-    kalman.x, kalman.P, kalman.Q, kalman.B = np.array(h.mean), h.covariance, process, _WAY
-    kalman.predict(np.array(way))
+    kalman.x = np.array([h.mean[0] - way[0], h.mean[1] - way[1], h.mean[2]])
+    kalman.P, kalman.Q = h.covariance, process
+    kalman.predict()
     # A bearing error enters the azimuth only through ψ_s: the two measurements are independent of each other.
     fix = np.array([sighting.bearing_rad, sighting.azimuth_rad])
     kalman.update(fix, _slopes, _angles, noise, residual=_turn)

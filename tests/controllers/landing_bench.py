@@ -86,7 +86,7 @@ class Eye:
         glance = look(self.name, T_station_body, rng)
         self.filter.predict(senses)
         if glance.pose is not None:
-            known = np.linalg.inv(glance.pose.covariance)
+            known = np.diag(1.0 / np.diag(glance.pose.covariance))
             level = LevelPose(glance.pose, known, np.zeros(6), np.zeros((6, 6)), np.zeros(0), 0.0)
             if self.filter.running:
                 self.filter.update([level], senses)
@@ -99,7 +99,9 @@ class Eye:
             return glance_of(None, glance.long_range, "lost" if self.missed >= 60 else "searching")
         T, covariance = self.filter.pose(senses)
         status = "tracking" if glance.pose is not None else "holding"
-        return glance_of(PoseEstimate(T, covariance, (), "bench", 0.5, glance.pose is not None), glance.long_range, status)
+        return glance_of(
+            PoseEstimate(T, covariance, (), "bench", 0.5, glance.pose is not None), glance.long_range, status
+        )
 
 
 class Lander(Hoverer):

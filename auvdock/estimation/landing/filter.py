@@ -53,7 +53,7 @@ class LandingFilter:
 
     def reset(self) -> None:
         """Forget everything."""
-        self._kalman: _Kalman | None = None
+        self._kalman: ExtendedKalmanFilter | None = None
         self._last: Proprioception | None = None
 
     @property
@@ -75,7 +75,8 @@ class LandingFilter:
         # A heading error turns the step.
         kalman.F[0, 3], kalman.F[1, 3] = -float(step[1]), float(step[0])
         kalman.Q = self._process(proprioception, dt)
-        kalman.predict(moved)
+        kalman.predict()
+        kalman.x = moved  # no matrix product: filterpy moves the covariance alone
 
     def expected(self, proprioception: Proprioception) -> tuple[Array, Array] | None:
         """Move the state on to the time of a sample: the pose (4, 4) there and its covariance (6, 6), None if empty."""
@@ -101,7 +102,7 @@ class LandingFilter:
         """Correct the state by one or two levels of the same frame; they share the inclinometer's noise."""
         kalman = self._running()
         pull, expected, by_state, noise = self._measurement(levels, proprioception)
-        kalman.update(pull, lambda _: by_state, lambda _: expected, noise)
+        kalman.update(pull, _at_state, _at_state, noise, args=(by_state,), hx_args=(expected,))
         self._settle(kalman, kalman.x)
 
     def start(self, levels: Sequence[LevelPose], proprioception: Proprioception) -> None:
@@ -126,19 +127,19 @@ class LandingFilter:
         back = np.linalg.inv(self._jacobians(state, T_station_camera[:3, :3])[0])
         self._begin(state, back @ covariance @ back.T, proprioception)
 
-    def _begin(self, state: Array, covariance: Array, proprioception: Proprioception) -> _Kalman:
-        self._kalman = kalman = _Kalman(dim_x=6, dim_z=6)
+    def _begin(self, state: Array, covariance: Array, proprioception: Proprioception) -> ExtendedKalmanFilter:
+        self._kalman = kalman = ExtendedKalmanFilter(dim_x=6, dim_z=6)
         kalman.x, kalman.P = state, covariance
         self._last = proprioception
         return kalman
 
     @staticmethod
-    def _settle(kalman: _Kalman, state: Array) -> None:
+    def _settle(kalman: ExtendedKalmanFilter, state: Array) -> None:
         """Take a state, its heading within ±π, and make P symmetric."""
         state[3] = wrap_angle(float(state[3]))
         kalman.x, kalman.P = state, 0.5 * (kalman.P + kalman.P.T)
 
-    def _running(self) -> _Kalman:
+    def _running(self) -> ExtendedKalmanFilter:
         if self._kalman is None:
             raise ValueError("the filter holds no state yet")
         return self._kalman
@@ -198,12 +199,9 @@ class LandingFilter:
         return np.diag([step, step, step, turn, 0.0, 0.0])
 
 
-class _Kalman(ExtendedKalmanFilter):
-    """filterpy's filter with a motion that is no matrix product."""
-
-    def predict_x(self, u: Array) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Take the moved state (6,), as `LandingFilter` works it out."""
-        self.x = u
+def _at_state(_: Array, known: Array) -> Array:
+    """What filterpy asks for as a function of the state, and what `_measurement` has worked out for this one."""
+    return known
 
 
 def _R_station_body(state: Array, sample: Proprioception) -> Array:
