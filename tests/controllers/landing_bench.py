@@ -89,7 +89,7 @@ class Eye:
             known = np.diag(1.0 / np.diag(glance.pose.covariance))
             level = LevelPose(glance.pose, known, np.zeros(6), np.zeros((6, 6)), np.zeros(0), 0.0)
             if self.filter.running:
-                self.filter.update([level], senses)
+                self.filter.update([self.filter.compare(level, senses)])
             else:
                 self.filter.start([level], senses)
         self.missed = 0 if glance.pose is not None else self.missed + 1

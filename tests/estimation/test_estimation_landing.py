@@ -115,6 +115,29 @@ def test_one_level_is_enough():
                 assert (percept.status, percept.level) == ("tracking", "tag" if gone == "lights" else "lights")
 
 
+def test_one_wrong_pose_is_refused_and_a_lasting_one_believed():
+    """The tag seems to lie 0.3 m off: single frames change nothing, `reset_after_n` in a row start the belief anew."""
+    rng = np.random.default_rng(3)
+    flight = Descent(np.array([0.0, 0.0, 2.0]), 0.0, 2.0)
+    senses = Senses(flight, rng)
+    cfg = LandingPerceptionCfg(levels="tag")
+    estimator = LandingEstimator(cfg, CAMERA, STATION)
+    shift_px = 0.3 / 2.0 * float(CAMERA.matrix[0, 0])
+    patience = cfg.filter.reset_after_n
+    for k in range(60 + patience):
+        (tag,) = senses.tags(k / 20)
+        wrong = k in (30, 40) or k >= 60
+        if wrong:
+            tag = dataclasses.replace(tag, corners_px=tag.corners_px + np.array([0.0, shift_px]))
+        percept = estimator.update(Detections.empty(), (tag,), senses.proprioception(k / 20))
+        assert percept.pose is not None
+        error_m = float(np.linalg.norm(percept.pose.T_station_camera[:3, 3] - flight.camera(k / 20)[:3, 3]))
+        last = k == 59 + patience
+        assert percept.pose.measured is (not wrong or last)
+        assert percept.restarts == (1 if last else 0)
+        assert (error_m > 0.2) is last
+
+
 def test_other_tags_are_ignored():
     rng = np.random.default_rng(2)
     flight = Descent(np.array([0.0, 0.0, 2.0]), 0.0, 2.0)

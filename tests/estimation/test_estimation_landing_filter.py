@@ -115,7 +115,7 @@ def test_two_levels_at_once_and_one_after_the_other_say_the_same():
         held = LandingFilter(FilterCfg(), AttitudeCfg(tilt_noise_deg=1e-4), CAMERA)
         held.start(first, own)
         if second:
-            held.update(second, own)
+            held.update([held.compare(second[0], own)])
         answers.append(held.pose(own))
     for pose, covariance in answers[1:]:
         sigma = np.sqrt(np.diag(answers[0][1]))

@@ -95,8 +95,10 @@ class LandingEstimator:
             return self._begin(named, tag, proprioception)
         gate, patience = self._cfg.filter.gate, self._cfg.filter.reset_after_n
         lights = named.pose if named is not None else None
-        good_tag = tag is not None and self._filter.distance2(tag, proprioception) <= gate
-        good_lights = lights is not None and self._filter.distance2(lights, proprioception) <= gate
+        of_tag = None if tag is None else self._filter.compare(tag, proprioception)
+        of_lights = None if lights is None else self._filter.compare(lights, proprioception)
+        good_tag = of_tag is not None and of_tag.distance2 <= gate
+        good_lights = of_lights is not None and of_lights.distance2 <= gate
         new_tag = self._new_tag.add(None if good_tag else tag, proprioception)
         new_lights = self._new_lights.add(None if good_lights else _convincing(named), proprioception)
         # The tag's code is proof of what it is, so it is believed against the lights; these only against no one.
@@ -106,7 +108,11 @@ class LandingEstimator:
         if lights is not None and new_lights >= patience and self._missed_tag >= patience:
             self._restart(lights, proprioception)
             return True, False
-        self._apply(lights if good_lights else None, tag if good_tag else None, proprioception)
+        good = [each for each in (of_lights, of_tag) if each is not None and each.distance2 <= gate]
+        if good and self._cfg.fusion == "ekf":
+            self._filter.update(good)
+        elif good:
+            self._place([each.level for each in good], proprioception)
         return good_lights, good_tag
 
     def _begin(
@@ -128,23 +134,17 @@ class LandingEstimator:
         self._filter.start(levels, proprioception)
         self._forget()
         if self._cfg.fusion == "weighted":
-            self._apply(lights, tag, proprioception)
+            self._place(levels, proprioception)
 
     def _restart(self, level: LevelPose, proprioception: Proprioception) -> None:
         self._start(level, None, proprioception)
         self._restarts += 1
 
-    def _apply(self, lights: LevelPose | None, tag: LevelPose | None, proprioception: Proprioception) -> None:
-        levels = [level for level in (lights, tag) if level is not None]
-        if not levels:
-            return
-        if self._cfg.fusion == "ekf":
-            self._filter.update(levels, proprioception)
-            return
-        if lights is not None and tag is not None:
-            pose, covariance = weighted_mean(lights, tag)
-        else:
-            pose, covariance = levels[0].T_station_camera, levels[0].estimate.covariance
+    def _place(self, levels: Sequence[LevelPose], proprioception: Proprioception) -> None:
+        """Bare weighted fusion of one or two levels, lights first."""
+        pose, covariance = levels[0].T_station_camera, levels[0].estimate.covariance
+        if len(levels) == 2:
+            pose, covariance = weighted_mean(*levels)
         self._filter.place(pose, covariance, proprioception)
 
     def _settle(self, measured: bool) -> None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -33,10 +34,30 @@ from auvdock.core.transforms import (
 from auvdock.perception.landing.config import AttitudeCfg, FilterCfg
 from auvdock.perception.landing.level import LevelPose, pose_offset
 
-__all__ = ["LandingFilter"]
+__all__ = ["Innovation", "LandingFilter"]
 
 _CORRELATION_S = 2.0
 """For how long a constant error of DVL and gyroscopes acts before a measurement takes its effect out again."""
+
+
+class Innovation(NamedTuple):
+    """A level's pose less what is expected of it.
+
+    Attributes:
+        level: the pose.
+        gap: (6,) measured less expected error coordinates.
+        by_state: (6, 6) derivative of the expected ones by the state.
+        by_tilt: (6, 2) and by the white noise of roll and pitch.
+        noise: (6, 6) covariance of the pixels' share.
+        distance2: squared Mahalanobis distance.
+    """
+
+    level: LevelPose
+    gap: Array
+    by_state: Array
+    by_tilt: Array
+    noise: Array
+    distance2: float
 
 
 class LandingFilter:
@@ -91,18 +112,22 @@ class LandingFilter:
         covariance = by_state @ kalman.P @ by_state.T + self._tilt_noise * (by_noise @ by_noise.T)
         return T, 0.5 * (covariance + covariance.T)
 
-    def distance2(self, level: LevelPose, proprioception: Proprioception) -> float:
-        """Squared Mahalanobis distance of a level's pose from the state."""
-        pull, expected, by_state, noise = self._measurement([level], proprioception)
-        innovation, spread = pull - expected, by_state @ self._running().P @ by_state.T + noise
-        weighed = solve_positive(spread, innovation)
-        return math.inf if weighed is None else float(innovation @ weighed)
+    def compare(self, level: LevelPose, proprioception: Proprioception) -> Innovation:
+        """Hold a level's pose against the state."""
+        kalman = self._running()
+        gap = level.pull - pose_offset(level.T_station_camera, self._transform(kalman.x, proprioception))
+        by_state, tilt = self._jacobians(kalman.x, level.T_station_camera[:3, :3])
+        trace = float(np.trace(level.information))
+        noise = np.linalg.inv(level.information + 1e-9 * trace / 6.0 * np.eye(6))
+        spread = by_state @ kalman.P @ by_state.T + noise + self._tilt_noise * (tilt @ tilt.T)
+        weighed = solve_positive(spread, gap)
+        return Innovation(level, gap, by_state, tilt, noise, math.inf if weighed is None else float(gap @ weighed))
 
-    def update(self, levels: Sequence[LevelPose], proprioception: Proprioception) -> None:
+    def update(self, innovations: Sequence[Innovation]) -> None:
         """Correct the state by one or two levels of the same frame; they share the inclinometer's noise."""
         kalman = self._running()
-        pull, expected, by_state, noise = self._measurement(levels, proprioception)
-        kalman.update(pull, _at_state, _at_state, noise, args=(by_state,), hx_args=(expected,))
+        gap, by_state, noise = self._joint(innovations)
+        kalman.update(gap, _known, _known, noise, args=(by_state,), hx_args=(np.zeros(len(gap)),))
         self._settle(kalman, kalman.x)
 
     def start(self, levels: Sequence[LevelPose], proprioception: Proprioception) -> None:
@@ -113,11 +138,11 @@ class LandingFilter:
         first = levels[0].T_station_camera
         yaw = euler_zyx_from_rotation(first[:3, :3] @ self._body_camera.T)[2]
         kalman = self._begin(np.array([*first[:3, 3].tolist(), yaw, 0.0, 0.0]), np.zeros((6, 6)), proprioception)
-        pull, expected, by_state, noise = self._measurement(levels, proprioception)
+        gap, by_state, noise = self._joint([self.compare(level, proprioception) for level in levels])
         weighed = np.linalg.solve(noise, by_state)
         known = np.diag([0.0] * 4 + [1.0 / self._tilt_bias] * 2)
         kalman.P = np.linalg.inv(by_state.T @ weighed + known)
-        self._settle(kalman, kalman.x + kalman.P @ (weighed.T @ (pull - expected)))
+        self._settle(kalman, kalman.x + kalman.P @ (weighed.T @ gap))
 
     def place(self, T_station_camera: Array, covariance: Array, proprioception: Proprioception) -> None:
         """Take a pose as it is: what bare weighted fusion does with each frame."""
@@ -158,23 +183,15 @@ class LandingFilter:
         by_state[3:, 3], by_state[3:, 4], by_state[3:, 5] = about_yaw, -about_roll, -about_pitch
         return by_state, by_state[:, 4:]
 
-    def _measurement(
-        self, levels: Sequence[LevelPose], proprioception: Proprioception
-    ) -> tuple[Array, Array, Array, Array]:
-        """Error coordinates of k levels, measured and expected (6 k,), their Jacobian (6 k, 6) and noise (6 k, 6 k)."""
-        state = self._running().x
-        T = self._transform(state, proprioception)
-        k = len(levels)
-        expected, by_state = np.empty(6 * k), np.empty((6 * k, 6))
-        tilt, noise = np.empty((6 * k, 2)), np.zeros((6 * k, 6 * k))
-        for index, level in enumerate(levels):
+    def _joint(self, innovations: Sequence[Innovation]) -> tuple[Array, Array, Array]:
+        """Gap (6 k,), Jacobian (6 k, 6) and noise (6 k, 6 k) of k levels together."""
+        tilt = np.concatenate([each.by_tilt for each in innovations])
+        noise = self._tilt_noise * (tilt @ tilt.T)
+        for index, each in enumerate(innovations):
             rows = slice(6 * index, 6 * index + 6)
-            expected[rows] = pose_offset(level.T_station_camera, T)
-            by_state[rows], tilt[rows] = self._jacobians(state, level.T_station_camera[:3, :3])
-            trace = float(np.trace(level.information))
-            noise[rows, rows] = np.linalg.inv(level.information + 1e-9 * trace / 6.0 * np.eye(6))
-        pull = np.concatenate([level.pull for level in levels])
-        return pull, expected, by_state, noise + self._tilt_noise * (tilt @ tilt.T)
+            noise[rows, rows] += each.noise
+        gap = np.concatenate([each.gap for each in innovations])
+        return gap, np.concatenate([each.by_state for each in innovations]), noise
 
     def _moved(self, state: Array, last: Proprioception, now: Proprioception, dt: float) -> Array:
         moved = state.copy()
@@ -199,9 +216,9 @@ class LandingFilter:
         return np.diag([step, step, step, turn, 0.0, 0.0])
 
 
-def _at_state(_: Array, known: Array) -> Array:
-    """What filterpy asks for as a function of the state, and what `_measurement` has worked out for this one."""
-    return known
+def _known(_: Array, value: Array) -> Array:
+    """What filterpy asks for as a function of the state; it was worked out for this one."""
+    return value
 
 
 def _R_station_body(state: Array, sample: Proprioception) -> Array:
