@@ -19,13 +19,13 @@ from auvdock.controllers.control_law import (
     body_wrench,
 )
 from auvdock.controllers.gains import AutopilotGains, DesignCfg, design_gains
-from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
 from auvdock.core.contracts import Proprioception
 from auvdock.core.errors import located
 from auvdock.core.limits import Positive, PositiveShare
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.estimation.senses import Senses, Vector, read_senses
 from auvdock.numeric.records import Records
 
 __all__ = ["Autopilot", "AutopilotCfg", "AutopilotSetpoint", "AutopilotState"]

@@ -25,9 +25,7 @@ from auvdock.controllers.modes import (
     next_mode,
 )
 from auvdock.controllers.pilot_state import PilotState, Progress, Stage
-from auvdock.controllers.relative_state import FilterCfg, RelativeFilter, RelativeState
 from auvdock.controllers.rotating.config import RotatingControlCfg
-from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.controllers.steering import (
     SearchCfg,
     Sight,
@@ -44,6 +42,8 @@ from auvdock.core.checked import Checked
 from auvdock.core.contracts import Bearing, Command, Percept, Proprioception
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.estimation.relative_state import FilterCfg, RelativeFilter, RelativeState
+from auvdock.estimation.senses import Senses, Vector, read_senses
 
 __all__ = ["ConicalPilot", "ControlCfg", "Pilot", "PilotState"]
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from auvdock.controllers.autopilot import AutopilotState
 from auvdock.controllers.modes import ACQUIRE
-from auvdock.controllers.relative_state import RelativeState
 from auvdock.controllers.steering import Line, Sight
+from auvdock.estimation.relative_state import RelativeState
 
 __all__ = ["PilotState", "Progress", "Stage"]
 

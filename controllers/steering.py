@@ -11,10 +11,10 @@ from typing import NamedTuple
 from auvdock.controllers.autopilot import AutopilotSetpoint
 from auvdock.controllers.axis_guidance import AxisLaw, Place, axis_course, crab
 from auvdock.controllers.guidance import GuidanceCfg
-from auvdock.controllers.senses import Senses, Vector
 from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 from auvdock.core.limits import Positive
+from auvdock.estimation.senses import Senses, Vector
 from auvdock.numeric.records import Records
 from auvdock.numeric.scalars import limited
 

@@ -95,8 +95,8 @@ from auvdock.envs.chase import from_the_side
 from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.perceived import perceived_landing
 from auvdock.envs.vehicle_env import VehicleEnv, box
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.perception.landing.config import LandingPerceptionCfg
-from auvdock.perception.landing.pipeline import LandingPercept
 from auvdock.sim.truth import Truth
 
 __all__ = ["LandingEnv"]

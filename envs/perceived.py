@@ -7,11 +7,11 @@ from auvdock.envs.config import WorldCfg
 from auvdock.envs.landing_config import LandingWorldCfg
 from auvdock.envs.landing_world import LandingWorld
 from auvdock.envs.world import DockingWorld
+from auvdock.estimation.landing.estimator import LandingEstimator
+from auvdock.estimation.perceiver import BeaconPerceiver, LandingPerceiver
 from auvdock.perception.detectors import make_detector, make_station_detector
 from auvdock.perception.landing.config import LandingPerceptionCfg
-from auvdock.perception.landing.pipeline import LandingPerception
 from auvdock.perception.landing.tag_detectors import make_tag_detector
-from auvdock.perception.perceiver import BeaconPerceiver, LandingPerceiver
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
 
 __all__ = ["perceived_docking", "perceived_landing"]
@@ -42,4 +42,4 @@ def perceived_landing(cfg: LandingWorldCfg, perception: LandingPerceptionCfg) ->
         detector = make_detector(perception.detector)
         tag_detector = make_tag_detector(perception.tag_detector, (cfg.station.tag.tag_id,))
     world = LandingWorld(cfg, perception.detector, perception.tag_detector)
-    return world, LandingPerceiver(detector, tag_detector, LandingPerception(perception, world.camera, cfg.station))
+    return world, LandingPerceiver(detector, tag_detector, LandingEstimator(perception, world.camera, cfg.station))

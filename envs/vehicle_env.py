@@ -20,7 +20,7 @@ from auvdock.envs.chase import ChaseCamera, View, from_behind
 from auvdock.envs.options import check_options, reward_settings, world_settings
 from auvdock.envs.reward import RewardCfg
 from auvdock.envs.vehicle_world import AnyWorldCfg, VehicleWorld
-from auvdock.perception.perceiver import Perceiver
+from auvdock.estimation.perceiver import Perceiver
 from auvdock.sim.simulator import Simulator
 from auvdock.sim.truth import Truth
 

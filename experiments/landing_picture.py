@@ -17,8 +17,8 @@ from auvdock.envs.chase import ChaseCamera, from_the_side
 from auvdock.episode.config import landing_level_cfg
 from auvdock.episode.runner import EpisodeRunner
 from auvdock.episode.trace import Tick
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.experiments.pictures import Album
-from auvdock.perception.landing.pipeline import LandingPercept
 
 __all__ = ["main"]
 

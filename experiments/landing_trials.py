@@ -23,8 +23,9 @@ from auvdock.episode.landing_metrics import ALIGNED_MODES, estimate_error
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
 from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.estimation.landing.estimator import LandingEstimator
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.perception.landing.config import LEVELS, LandingPerceptionCfg
-from auvdock.perception.landing.pipeline import LandingPercept, LandingPerception
 
 __all__ = ["PAPER", "LandingTrial", "LandingWatch", "TrialSummary", "fly_trials", "summarise", "trial_cfg"]
 
@@ -80,7 +81,7 @@ class LandingWatch:
         self._T_body_camera = setup.camera.T_body_camera
         self._seat = np.append(setup.vehicle.seat_body_m, 1.0)
         self._eyes = {
-            name: LandingPerception(_with_levels(self._cfg, name), setup.camera, self._station)
+            name: LandingEstimator(_with_levels(self._cfg, name), setup.camera, self._station)
             for name in LEVELS
             if name != self._cfg.levels
         }

@@ -14,6 +14,7 @@ ORDER = (
     "sim",
     "optics",
     "perception",
+    "estimation",
     "planning",
     "controllers",
     "envs",
@@ -25,7 +26,7 @@ ORDER = (
 )
 MAPPED = ("assets", "controllers", "envs", "experiments")
 EXCEPTIONS = {("assets", "core"), ("core", "assets")}  # presets and their errors know each other
-BLIND = {"perception": {"sim", "optics"}, "controllers": {"sim", "optics"}}
+BLIND = {room: {"sim", "optics"} for room in ("perception", "estimation", "controllers")}
 
 
 def folder(room):

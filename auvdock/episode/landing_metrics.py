@@ -16,7 +16,7 @@ from auvdock.core.transforms import invert
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.episode.false_poses import FalsePoses
 from auvdock.episode.trace import Tick
-from auvdock.perception.landing.pipeline import LandingPercept
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.sim.truth import Truth
 
 __all__ = ["ALIGNED_MODES", "LandingMetrics", "estimate_error"]

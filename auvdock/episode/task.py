@@ -13,7 +13,7 @@ from auvdock.core.stations import StationCfg
 from auvdock.envs.vehicle_world import VehicleWorld
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.episode.trace import Tick
-from auvdock.perception.perceiver import Perceiver
+from auvdock.estimation.perceiver import Perceiver
 from auvdock.sim.truth import Truth
 
 __all__ = ["Metrics", "Task", "make_pilot"]

@@ -1,4 +1,4 @@
-"""A vehicle's own motion as its sensors tell it, for the controllers' compiled laws (`controllers.senses`)."""
+"""A vehicle's own motion as its sensors tell it, for compiled filters and laws (`estimation.senses`)."""
 
 from __future__ import annotations
 

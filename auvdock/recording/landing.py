@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from auvdock.core.arrays import Array
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.transforms import invert
-from auvdock.perception.landing.pipeline import LandingPercept
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.recording import paths
 from auvdock.recording.batch import PIXEL_CORNER, Batch
 from auvdock.recording.palette import rgba

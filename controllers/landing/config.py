@@ -10,11 +10,10 @@ from auvdock.controllers.gains import Crossover, DesignCfg, PhaseMargin
 from auvdock.controllers.landing.guidance import LandingGuidanceCfg
 from auvdock.controllers.landing.modes import LandingModeCfg
 from auvdock.controllers.landing.search import SpiralCfg
-from auvdock.controllers.relative_state import FilterCfg
 from auvdock.core.checked import Checked
 from auvdock.core.limits import Positive
 
-__all__ = ["HoverAllocationCfg", "HoverAutopilotCfg", "HoverDesignCfg", "HoverFilterCfg", "LandingControlCfg"]
+__all__ = ["HoverAllocationCfg", "HoverAutopilotCfg", "HoverDesignCfg", "LandingControlCfg"]
 
 
 @dataclass(frozen=True)
@@ -56,20 +55,6 @@ class HoverAllocationCfg(AllocationCfg):
 
 
 @dataclass(frozen=True)
-class HoverFilterCfg(FilterCfg):
-    """Relative filter over a few metres, where poses are good to a centimetre and dead reckoning to millimetres."""
-
-    position_walk_m_rs: Positive = 0.006
-    """Dead reckoning: a DVL of 3 mm/s at 20 Hz makes 0.7 mm/√s, its scale error and the compass a few more."""
-    heading_walk_rad_rs: Positive = 0.002
-    """The bearing of the station's axis."""
-    position_floor_m: Positive = 0.005
-    """Added to a measured position's standard deviation."""
-    rotation_floor_rad: Positive = 0.015
-    """Added to a measured rotation's standard deviation: inclinometer, compass and the station's own tilt."""
-
-
-@dataclass(frozen=True)
 class LandingControlCfg(Checked):
     """Settings of the landing pilot."""
 
@@ -77,8 +62,9 @@ class LandingControlCfg(Checked):
     """Loops and their limits."""
     allocation: HoverAllocationCfg = HoverAllocationCfg()
     """Wrench to actuators."""
-    filter: HoverFilterCfg = HoverFilterCfg()
-    """Relative state."""
+    position_walk_m_rs: float = 0.006
+    """Dead reckoning without a pose: standard deviation after 1 s, growing with the square root of time. A DVL of
+    3 mm/s at 20 Hz makes 0.7 mm/√s, its scale error and the compass a few more."""
     guidance: LandingGuidanceCfg = LandingGuidanceCfg()
     """Speeds, corridor, station keeping."""
     search: SpiralCfg = SpiralCfg()

@@ -138,10 +138,10 @@ class LandingFacts(NamedTuple):
         since_fix_s: time since the last accepted pose, infinite without one.
         lost: perception says that it has lost the station.
         jumped: the filter began anew in this period because poses had disagreed for long.
-        sigma_m: horizontal standard deviation, infinite without a relative state.
-        height_m: of the seat above its place, by the relative state or else by the pressure gauge.
-        offset_m: horizontal distance of the seat from its place, infinite without a relative state.
-        heading_error_rad: magnitude of ψ, infinite without a relative state.
+        sigma_m: horizontal standard deviation, infinite without a belief.
+        height_m: of the seat above its place, by the belief or else by the pressure gauge.
+        offset_m: horizontal distance of the seat from its place, infinite without a belief.
+        heading_error_rad: magnitude of ψ, infinite without a belief.
         allowed_m: half width of the corridor at this height.
         sights: frames in a row with the lights.
         since_sight_s: time since lights were last seen.

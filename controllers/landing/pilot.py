@@ -8,19 +8,18 @@ import numpy as np
 
 from auvdock.controllers.allocation import ThrustAllocator
 from auvdock.controllers.autopilot import Autopilot, AutopilotSetpoint
+from auvdock.controllers.landing.belief import BeliefReader
 from auvdock.controllers.landing.config import LandingControlCfg
 from auvdock.controllers.landing.guidance import Flat, Place, corridor_m, station_keeping
 from auvdock.controllers.landing.modes import ABORT, DESCEND, DOCKED, SEARCH, TOUCHDOWN, LandingFacts, next_landing_mode
 from auvdock.controllers.landing.state import LandingState
 from auvdock.controllers.landing.steering import Demand, Situation, demand
-from auvdock.controllers.relative_state import RelativeFilter, RelativeState
-from auvdock.controllers.senses import Senses, Vector, read_senses
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import Bearing, Command, Percept, Proprioception
 from auvdock.core.landing_station import LandingStationCfg
-from auvdock.core.marine import flip_vector
 from auvdock.core.vehicle import VehicleCfg
-from auvdock.perception.landing.pipeline import LandingPercept
+from auvdock.estimation.landing.percept import LandingPercept
+from auvdock.estimation.senses import Senses, read_senses
 
 __all__ = ["LandingPilot"]
 
@@ -54,12 +53,9 @@ class LandingPilot:
         self.autopilot = Autopilot(vehicle, cfg.autopilot, dt_s)
         self.allocator = ThrustAllocator(vehicle, cfg.allocation)
         self._dt_s = dt_s
-        self._filter = RelativeFilter(cfg.filter, camera.T_body_camera, dt_s, front=(0.0, 0.0, 1.0))
+        self._reader = BeliefReader(vehicle, station, camera, cfg.position_walk_m_rs, dt_s)
         self._R_body_camera = np.ascontiguousarray(camera.T_body_camera[:3, :3])
-        seat = flip_vector(np.array(vehicle.seat_m))
-        x, y, z = (seat - camera.T_body_camera[:3, 3]).tolist()
-        self._camera_to_seat: Vector = (x, y, z)
-        self._seat_up_m = float(seat[2])
+        self._seat_up_m = float(vehicle.seat_body_m[2])
         self._camera_up_m = float(camera.T_body_camera[2, 3])
         self._seat_height_m = station.guide.seat_height_m
         self._platform_depth_m = station.depth_m
@@ -72,7 +68,7 @@ class LandingPilot:
             since_s=None,
             attempts=1,
             giving_up=False,
-            relative=None,
+            belief=None,
             lost=False,
             autopilot=self.autopilot.initial_state(),
             track_m=(0.0, 0.0),
@@ -96,11 +92,13 @@ class LandingPilot:
         if state.since_s is None:
             height = self._height_by_pressure(senses)
             state = state._replace(since_s=senses.time_s, anchor_height_m=height, anchor_rad=senses.yaw_rad)
-        restarts = _restarts(state.relative)
+        before = state.belief
         state = self._look(self._reckon(state, percept, senses), percept, senses)
-        place = self._place(state.relative, senses)
+        belief = state.belief
+        place = belief.place if belief is not None else None
         height = place.height_m if place is not None else self._height_by_pressure(senses)
-        facts = self._facts(state, place, height, senses, _restarts(state.relative) > restarts)
+        jumped = before is not None and belief is not None and belief.restarts > before.restarts
+        facts = self._facts(state, height, senses, jumped)
         mode = next_landing_mode(state.mode, facts, self.cfg.modes)
         if mode != state.mode:
             state = self._enter(state, mode, height, senses)
@@ -113,32 +111,24 @@ class LandingPilot:
         return self._act(state, wanted, place, senses, state.giving_up and mode == ABORT and clear)
 
     def _reckon(self, state: LandingState, percept: Percept | None, senses: Senses) -> LandingState:
-        """Dead reckoning and, with a measured pose, the relative state after this period."""
-        pose = percept.pose if percept is not None and percept.pose is not None and percept.pose.measured else None
-        relative = state.relative
-        if relative is None:
-            relative = self._filter.start(pose, senses) if pose is not None else None
-        else:
-            relative = self._filter.advance(relative, senses, pose)
+        """The belief of this period, and dead reckoning of the way flown."""
         east, north, _ = senses.level(senses.yaw_rad, senses.ground_m_s)
         track = state.track_m[0] + east * self._dt_s, state.track_m[1] + north * self._dt_s
         # A perception that does not say how it fares is not lost: the age of its last pose decides alone.
         lost = percept.status == "lost" if isinstance(percept, LandingPercept) else percept is None and state.lost
-        return state._replace(relative=relative, track_m=track, lost=lost)
+        return state._replace(belief=self._reader.advance(state.belief, percept, senses), track_m=track, lost=lost)
 
     def _look(self, state: LandingState, percept: Percept | None, senses: Senses) -> LandingState:
-        """Remember where the station is: from the relative state, or from the direction to its lights."""
+        """Remember where the station is: from the belief, or from the direction to its lights."""
         bearing = percept.long_range if percept is not None else None
         if percept is not None:
             state = state._replace(sights=state.sights + 1 if bearing is not None else 0)
         if bearing is not None:
             state = state._replace(sight_s=senses.time_s)
-        relative = state.relative
-        if relative is not None and relative.fixes >= self.cfg.modes.confirm_fixes:
-            place = self._place(relative, senses)
-            if place is not None:
-                dx, dy = _turned((-place.ahead_m, -place.port_m), relative.axis_yaw_rad)
-                return state._replace(spot_m=(state.track_m[0] + dx, state.track_m[1] + dy))
+        belief = state.belief
+        if belief is not None and belief.fixes >= self.cfg.modes.confirm_fixes:
+            dx, dy = _turned((-belief.place.ahead_m, -belief.place.port_m), belief.axis_yaw_rad)
+            return state._replace(spot_m=(state.track_m[0] + dx, state.track_m[1] + dy))
         spot = self._below(bearing, senses) if bearing is not None else None
         if spot is None:
             return state
@@ -162,28 +152,16 @@ class LandingPilot:
         """Height of the seat above its place from the pressure gauge and the station's charted depth."""
         return self._platform_depth_m - self._seat_height_m - senses.depth_m + self._seat_up_m
 
-    def _place(self, relative: RelativeState | None, senses: Senses) -> Place | None:
-        if relative is None:
-            return None
-        heading = math.remainder(senses.yaw_rad - relative.axis_yaw_rad, math.tau)
-        x, y, z = senses.level(heading, self._camera_to_seat)
-        px, py, pz = relative.camera_m
-        return Place(px + x, py + y, pz + z - self._seat_height_m, heading)
-
-    def _facts(
-        self, state: LandingState, place: Place | None, height_m: float, senses: Senses, jumped: bool
-    ) -> LandingFacts:
-        now, relative = senses.time_s, state.relative
-        sigma = math.inf
-        if relative is not None:
-            sigma = math.sqrt(max(float(relative.covariance[0, 0]), float(relative.covariance[1, 1]), 0.0))
+    def _facts(self, state: LandingState, height_m: float, senses: Senses, jumped: bool) -> LandingFacts:
+        now, belief = senses.time_s, state.belief
+        place = belief.place if belief is not None else None
         return LandingFacts(
             latched=senses.latched,
-            fixes=relative.fixes if relative is not None else 0,
-            since_fix_s=relative.since_fix_s if relative is not None else math.inf,
+            fixes=belief.fixes if belief is not None else 0,
+            since_fix_s=belief.since_fix_s if belief is not None else math.inf,
             lost=state.lost,
             jumped=jumped,
-            sigma_m=sigma,
+            sigma_m=math.sqrt(belief.variance_m2) if belief is not None else math.inf,
             height_m=height_m,
             offset_m=place.offset_m if place is not None else math.inf,
             heading_error_rad=abs(place.heading_rad) if place is not None else math.inf,
@@ -216,7 +194,7 @@ class LandingPilot:
         )
 
     def _situation(self, state: LandingState, place: Place | None, height_m: float, senses: Senses) -> Situation:
-        relative, track, spot = state.relative, state.track_m, state.spot_m
+        belief, track, spot = state.belief, state.track_m, state.spot_m
         return Situation(
             mode=state.mode,
             place=place,
@@ -225,8 +203,8 @@ class LandingPilot:
             from_anchor_m=(track[0] - state.anchor_m[0], track[1] - state.anchor_m[1]),
             anchor_height_m=state.anchor_height_m,
             anchor_rad=state.anchor_rad,
-            axis_yaw_rad=relative.axis_yaw_rad if relative is not None else None,
-            since_fix_s=relative.since_fix_s if relative is not None else math.inf,
+            axis_yaw_rad=belief.axis_yaw_rad if belief is not None else None,
+            since_fix_s=belief.since_fix_s if belief is not None else math.inf,
             lost=state.lost,
             in_mode_s=senses.time_s - (state.since_s or 0.0),
         )
@@ -278,7 +256,3 @@ class LandingPilot:
 def _turned(flat: Flat, angle_rad: float) -> Flat:
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
     return cosine * flat[0] - sine * flat[1], sine * flat[0] + cosine * flat[1]
-
-
-def _restarts(relative: RelativeState | None) -> int:
-    return relative.restarts if relative is not None else 0

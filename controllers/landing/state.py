@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from auvdock.controllers.autopilot import AutopilotState
+from auvdock.controllers.landing.belief import Belief
 from auvdock.controllers.landing.guidance import Flat
-from auvdock.controllers.relative_state import RelativeState
 
 __all__ = ["LandingState"]
 
@@ -21,7 +21,7 @@ class LandingState(NamedTuple):
         since_s: when it began; None before the first step.
         attempts: landings begun.
         giving_up: no attempt is left.
-        relative: camera before the station, None before the first pose.
+        belief: where the vehicle is, None before the first pose.
         lost: perception's last word was "lost".
         autopilot: integrals and references of the loops.
         track_m: where the vehicle is.
@@ -40,7 +40,7 @@ class LandingState(NamedTuple):
     since_s: float | None
     attempts: int
     giving_up: bool
-    relative: RelativeState | None
+    belief: Belief | None
     lost: bool
     autopilot: AutopilotState
     track_m: Flat

@@ -17,8 +17,8 @@ class Situation(NamedTuple):
 
     Attributes:
         mode: current mode.
-        place: seat relative to its place, None without a relative state.
-        height_m: of the seat above its place, by the relative state or the pressure gauge.
+        place: seat relative to its place, None without a belief.
+        height_m: of the seat above its place, by the belief or the pressure gauge.
         to_station_m: from the vehicle to the station, compass axes, None if nothing is known of it.
         from_anchor_m: from where the mode began to the vehicle, compass axes.
         anchor_height_m: height when the mode began.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from auvdock.controllers.rotating.beacon_filter import BeaconFilterCfg
 from auvdock.controllers.rotating.modes import RotatingModeCfg
 from auvdock.controllers.rotating.route import RouteCfg
 from auvdock.controllers.rotating.steering import CourseCfg, LookAroundCfg
 from auvdock.core.checked import Checked
+from auvdock.estimation.beacon_filter import BeaconFilterCfg
 
 __all__ = ["RotatingControlCfg"]
 

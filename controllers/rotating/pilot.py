@@ -11,7 +11,6 @@ import numpy as np
 from auvdock.controllers.axis_guidance import Place
 from auvdock.controllers.modes import ABORT, ACQUIRE, DOCKED, FAR, MID, next_mode
 from auvdock.controllers.pilot import ConicalPilot, ControlCfg, PilotState
-from auvdock.controllers.rotating.beacon_filter import BeaconFilter, BeaconState, Sighting
 from auvdock.controllers.rotating.modes import (
     APPROACH,
     CIRCLE,
@@ -21,12 +20,13 @@ from auvdock.controllers.rotating.modes import (
 )
 from auvdock.controllers.rotating.route import Leg, route
 from auvdock.controllers.rotating.steering import look_around, steer_course
-from auvdock.controllers.senses import Senses, Vector, cross, read_senses
 from auvdock.controllers.steering import Steering
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, AzimuthFix, Bearing, Command, Percept, Proprioception
 from auvdock.core.station import ConicalStationCfg
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.estimation.beacon_filter import BeaconFilter, BeaconState, Sighting
+from auvdock.estimation.senses import Senses, Vector, cross, read_senses
 
 __all__ = ["RotatingPilot", "RotatingState"]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
-from auvdock.controllers.senses import Senses, Vector
 from auvdock.controllers.steering import Line, Steering, ground_course
 from auvdock.core.checked import Checked
 from auvdock.core.limits import NotNegative, Positive, at_least
+from auvdock.estimation.senses import Senses, Vector
 
 __all__ = ["CourseCfg", "LookAroundCfg", "look_around", "steer_course"]
 

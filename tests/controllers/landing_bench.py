@@ -1,4 +1,4 @@
-"""A bench for the landing pilot: either vehicle, an ideal eye, and the latch's limits without guides or the station.
+"""A bench for the landing pilot: either vehicle, a noisy eye behind the landing filter, and the latch's limits.
 
 Without the station no guide helps and no platform stops the vehicle: it must come to the seat by itself.
 """
@@ -18,7 +18,10 @@ from auvdock.core.contracts import Bearing, Detections, PoseEstimate
 from auvdock.core.landing_station import load_landing_station
 from auvdock.core.marine import flip_vector
 from auvdock.core.transforms import invert, make_transform
-from auvdock.perception.landing.pipeline import LandingPercept
+from auvdock.estimation.landing.filter import LandingFilter
+from auvdock.estimation.landing.percept import LandingPercept
+from auvdock.perception.landing.config import AttitudeCfg, FilterCfg
+from auvdock.perception.landing.level import LevelPose
 
 STATION = load_landing_station()
 OPEN_WATER_M = np.array([30.0, 0.0, -STATION.depth_m])
@@ -69,6 +72,36 @@ def look(name, T_station_body, rng=None):
         ray = lights[lit].mean(axis=0)
         bearing = Bearing(ray / np.linalg.norm(ray), np.zeros(2), 0.9)
     return glance_of(pose, bearing, "tracking" if pose is not None else "searching")
+
+
+class Eye:
+    """`look` with noise, filtered as it is filtered at sea; what is not seen for 3 s is forgotten."""
+
+    def __init__(self, name):
+        self.name = name
+        self.filter = LandingFilter(FilterCfg(), AttitudeCfg(), CAMERAS[name])
+        self.missed = 0
+
+    def look(self, T_station_body, senses, rng):
+        glance = look(self.name, T_station_body, rng)
+        self.filter.predict(senses)
+        if glance.pose is not None:
+            known = np.diag(1.0 / np.diag(glance.pose.covariance))
+            level = LevelPose(glance.pose, known, np.zeros(6), np.zeros((6, 6)), np.zeros(0), 0.0)
+            if self.filter.running:
+                self.filter.update([self.filter.compare(level, senses)])
+            else:
+                self.filter.start([level], senses)
+        self.missed = 0 if glance.pose is not None else self.missed + 1
+        if self.missed >= 60:
+            self.filter.reset()
+        if not self.filter.running:
+            return glance_of(None, glance.long_range, "lost" if self.missed >= 60 else "searching")
+        T, covariance = self.filter.pose(senses)
+        status = "tracking" if glance.pose is not None else "holding"
+        return glance_of(
+            PoseEstimate(T, covariance, (), "bench", 0.5, glance.pose is not None), glance.long_range, status
+        )
 
 
 class Lander(Hoverer):
@@ -124,10 +157,10 @@ class Lander(Hoverer):
 def fly(lander, time_s, spoil=lambda glance, lander: glance, seed=1, pilot=None):
     """Closed loop; yields (offset, glance, command)."""
     pilot, rng = pilot or PILOTS[lander.name], np.random.default_rng(seed)
-    state = pilot.initial_state()
+    state, eye = pilot.initial_state(), Eye(lander.name)
     for _ in range(round(time_s / DT_S)):
         senses = lander.senses()
-        glance = spoil(look(lander.name, lander.T_station_body, rng), lander)
+        glance = spoil(eye.look(lander.T_station_body, senses, rng), lander)
         command, state = pilot.step(state, glance, senses)
         yield lander.offset(), glance, command
         if command.mode == "docked" or command.giving_up:

@@ -24,7 +24,7 @@ from auvdock.episode.landing_metrics import LandingMetrics, estimate_error
 from auvdock.episode.result import FAILURE_REASONS, EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
 from auvdock.episode.trace import Tick
-from auvdock.perception.landing.pipeline import LandingPercept
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.recording import paths
 from auvdock.recording.rerun_recorder import RerunRecorder
 

@@ -14,12 +14,12 @@ from landing_scenes import CAMERA, LIGHTS, STATION, Descent, Senses
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import BLUE, Detections
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
+from auvdock.estimation.landing.estimator import LandingEstimator
 from auvdock.perception.landing.bearing import group_bearing
 from auvdock.perception.landing.config import AttitudeCfg, LandingPerceptionCfg, LightLevelCfg
 from auvdock.perception.landing.evidence import log_odds
 from auvdock.perception.landing.level import LevelSolver, pose_offset
 from auvdock.perception.landing.lights import LightLevel
-from auvdock.perception.landing.pipeline import LandingPerception
 from auvdock.perception.tracker import LightTracker, TrackerCfg
 
 LEVEL = LightLevel(LightLevelCfg(), STATION, CAMERA, LevelSolver(AttitudeCfg(), CAMERA))
@@ -84,11 +84,11 @@ def test_strays_alone_give_no_pose():
     """Eight random spots: a first pose needs three consecutive frames that agree, and never gets them."""
     rng = np.random.default_rng(1)
     senses = Senses(Descent(np.array([0.0, 0.0, 4.0]), 0.0, 4.0), rng)
-    perception = LandingPerception(LandingPerceptionCfg(), CAMERA, STATION)
+    estimator = LandingEstimator(LandingPerceptionCfg(), CAMERA, STATION)
     for k in range(200):
         spots = rng.uniform(0.0, (800.0, 600.0), (8, 2))
         detections = Detections.from_points(spots, np.full(8, 0.9), np.full(8, BLUE), 0.01)
-        assert perception.update(detections, (), senses.proprioception(k / 20)).pose is None
+        assert estimator.update(detections, (), senses.proprioception(k / 20)).pose is None
 
 
 HOVER_M = 2.0
@@ -151,11 +151,11 @@ def test_strays_that_stay_give_no_pose():
     """A chance picture that stays, as snow and foreign lights do, agrees from frame to frame; it is no station."""
     rng = np.random.default_rng(2)
     senses = Senses(Descent(np.array([0.0, 0.0, HOVER_M]), 0.0, HOVER_M), rng)
-    perception = LandingPerception(LandingPerceptionCfg(), CAMERA, STATION)
+    estimator = LandingEstimator(LandingPerceptionCfg(), CAMERA, STATION)
     for picture in chance_pictures()[:12]:
-        perception.reset()
+        estimator.reset()
         for k in range(5):
-            percept = perception.update(spots_seen(picture), (), senses.proprioception(k / 20))
+            percept = estimator.update(spots_seen(picture), (), senses.proprioception(k / 20))
             assert percept.pose is None
 
 
@@ -165,12 +165,12 @@ def test_strays_do_not_move_a_pose():
     flight = Descent(np.array([0.1, -0.1, HOVER_M]), 0.0, HOVER_M)
     senses = Senses(flight, rng)
     cfg = LandingPerceptionCfg(lights=LightLevelCfg(min_odds=1e-300))
-    perception = LandingPerception(cfg, CAMERA, STATION)
+    estimator = LandingEstimator(cfg, CAMERA, STATION)
     strays = chance_pictures()[:25]
     for k in range(20 + len(strays)):
         t = k / 20
         lights = senses.lights(t) if k < 20 else spots_seen(strays[k - 20])
-        percept = perception.update(lights, (), senses.proprioception(t))
+        percept = estimator.update(lights, (), senses.proprioception(t))
         if percept.pose is not None:
             gap = percept.pose.T_station_camera[:3, 3] - flight.camera(t)[:3, 3]
             assert float(np.linalg.norm(gap)) < 0.1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from auvdock.core.contracts import Proprioception
-from auvdock.perception.landing.filter import LandingFilter
+from auvdock.estimation.landing.filter import LandingFilter
 from auvdock.perception.landing.level import LevelPose, pose_offset
 
 __all__ = ["Agreement"]

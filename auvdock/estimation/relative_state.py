@@ -13,12 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.controllers.relative_update import ACCEPTED, LEFT_OUT, REFUSED, relative_period
-from auvdock.controllers.senses import Senses, Vector
 from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
 from auvdock.core.contracts import PoseEstimate
 from auvdock.core.limits import Count, Positive
+from auvdock.estimation.relative_update import (
+    ACCEPTED,
+    LEFT_OUT,
+    REFUSED,
+    RelativeBelief,
+    RelativeLaw,
+    advance,
+)
+from auvdock.estimation.senses import Senses, Vector
+from auvdock.numeric.records import Records
 
 __all__ = ["FilterCfg", "RelativeFilter", "RelativeState"]
 
@@ -62,61 +70,74 @@ class RelativeState(NamedTuple):
     """Estimate at one moment.
 
     Attributes:
-        camera_m: camera in the station frame.
-        axis_yaw_rad: compass yaw of the station's x axis.
-        covariance: (4, 4) of (camera_m, axis_yaw_rad), m² and rad²; never written to.
+        belief: (1,) mean and covariance; never written to.
         since_fix_s: time since the last accepted pose.
         fixes: accepted poses since the filter started.
         refused: poses refused since the last accepted one.
         restarts: how often poses disagreed for so long that the filter began anew.
     """
 
-    camera_m: Vector
-    axis_yaw_rad: float
-    covariance: Array
+    belief: Records[RelativeBelief]
     since_fix_s: float
     fixes: int
     refused: int
     restarts: int
 
     @property
+    def camera_m(self) -> Vector:
+        """Camera in the station frame."""
+        x, y, z = self.belief["camera_m"][0].tolist()
+        return x, y, z
+
+    @property
+    def axis_yaw_rad(self) -> float:
+        """Compass yaw of the station's x axis."""
+        return self.belief["axis_yaw_rad"].item()
+
+    @property
+    def covariance(self) -> Array:
+        """(4, 4) of (camera_m, axis_yaw_rad), m² and rad²."""
+        return self.belief["covariance"][0]
+
+    @property
     def cross_track_sigma_m(self) -> float:
         """Standard deviation across the axis, the worse of sideways and vertical."""
-        return math.sqrt(max(self.covariance.item(5), self.covariance.item(10), 0.0))
+        covariance = self.covariance
+        return math.sqrt(max(covariance.item(1, 1), covariance.item(2, 2), 0.0))
 
 
 class RelativeFilter:
     """Reckoning and updates as pure functions of `RelativeState`."""
 
-    def __init__(
-        self,
-        cfg: FilterCfg,
-        T_body_camera: Array,
-        dt_s: float,
-        front: Vector = (1.0, 0.0, 0.0),
-        target_m: Vector = (0.0, 0.0, 0.0),
-    ) -> None:
+    def __init__(self, cfg: FilterCfg, T_body_camera: Array, dt_s: float, target_m: Vector = (0.0, 0.0, 0.0)) -> None:
         """Precompute noise and mounting.
 
         Args:
             cfg: noise levels.
             T_body_camera: (4, 4) pose of the camera on the body.
             dt_s: control period.
-            front: side of the station, station frame, from which its lights can be seen: a first pose lies there.
             target_m: the light whose direction may be fused, station frame.
         """
         self._cfg = cfg
         self._restart_after = cfg.restart_after
-        self._front = front
         self._dt_s = dt_s
         self._R_body_camera = np.ascontiguousarray(T_body_camera[:3, :3])
-        self._mounting = np.vstack([self._R_body_camera, T_body_camera[:3, 3], target_m]).astype(np.float64)
         self._floor = np.array([cfg.position_floor_m**2] * 3 + [cfg.rotation_floor_rad**2] * 3)
         walk, turn = cfg.position_walk_m_rs**2 * dt_s, cfg.heading_walk_rad_rs**2 * dt_s
-        least_trace = 1.0 + 2.0 * math.cos(cfg.max_rotation_mismatch_rad)
-        of_pose = [*self._floor.tolist(), cfg.inflation, cfg.gate, least_trace]
-        of_bearing = [cfg.bearing_floor_rad**2, cfg.entrance_spread_m, cfg.bearing_gate, cfg.min_bearing_range_m]
-        self._law = np.array([walk, walk, walk, turn, *of_pose, *of_bearing])
+        self._law = RelativeLaw(
+            R_body_camera=self._R_body_camera,
+            camera_m=T_body_camera[:3, 3],
+            target_m=np.array(target_m),
+            process=np.array([walk, walk, walk, turn]),
+            pose_floor=self._floor,
+            pose_inflation=cfg.inflation,
+            pose_gate=cfg.gate,
+            least_trace=1.0 + 2.0 * math.cos(cfg.max_rotation_mismatch_rad),
+            bearing_floor_rad2=cfg.bearing_floor_rad**2,
+            target_spread_m=cfg.entrance_spread_m,
+            bearing_gate=cfg.bearing_gate,
+            min_bearing_range_m=cfg.min_bearing_range_m,
+        ).packed()
 
     def advance(
         self, state: RelativeState, senses: Senses, pose: PoseEstimate | None = None, ray_camera: Array | None = None
@@ -143,21 +164,9 @@ class RelativeFilter:
     ) -> RelativeState:
         T, cov = (pose.T_station_camera, pose.covariance) if pose is not None else (_NO_POSE, _NO_NOISE)
         impatient = state.refused + 1 >= self._restart_after
-        estimate, covariance = np.array((*state.camera_m, state.axis_yaw_rad)), state.covariance.copy()
-        of_pose, of_bearing = relative_period(
-            estimate,
-            covariance,
-            senses.motion,
-            senses.yaw_rad,
-            dt_s,
-            self._mounting,
-            self._law,
-            T,
-            cov,
-            impatient,
-            ray_camera if ray_camera is not None else _NO_RAY,
-        )
-        x, y, z, axis_yaw_rad = estimate.tolist()
+        belief = state.belief.copy()
+        ray = ray_camera if ray_camera is not None else _NO_RAY
+        of_pose, of_bearing = advance(belief, senses.motion, senses.yaw_rad, dt_s, self._law, T, cov, impatient, ray)
         if dt_s == 0.0 and of_pose == LEFT_OUT and of_bearing != ACCEPTED:
             return state
         since_fix_s, fixes, refused = state.since_fix_s + dt_s, state.fixes, state.refused
@@ -165,14 +174,17 @@ class RelativeFilter:
             since_fix_s, fixes, refused = 0.0, fixes + 1, 0
         elif of_pose == REFUSED:
             refused += 1
-        after = RelativeState((x, y, z), axis_yaw_rad, covariance, since_fix_s, fixes, refused, state.restarts)
+        after = RelativeState(belief, since_fix_s, fixes, refused, state.restarts)
         if pose is None or of_pose != REFUSED or not impatient:
             return after
         fresh = self.start(pose, senses, state.restarts + 1)
         return self.update(fresh if fresh is not None else after, senses, ray_camera=ray_camera)
 
     def start(self, pose: PoseEstimate, senses: Senses, restarts: int = 0) -> RelativeState | None:
-        """A first state from one pose, or None if its tilt disagrees with the inclinometer or it is not finite."""
+        """A first state from one pose.
+
+        None if it is not finite, lies behind the station or tilts otherwise than the inclinometer says.
+        """
         T, cov = pose.T_station_camera, pose.covariance
         if not (np.isfinite(T).all() and np.isfinite(cov).all()):
             return None
@@ -180,9 +192,8 @@ class RelativeFilter:
         pitch = -math.asin(max(-1.0, min(1.0, float(R_station_body[2, 0]))))
         roll = math.atan2(float(R_station_body[2, 1]), float(R_station_body[2, 2]))
         limit = self._cfg.max_tilt_mismatch_rad
-        x, y, z = T[:3, 3].tolist()
-        front = self._front[0] * x + self._front[1] * y + self._front[2] * z
-        if abs(pitch - senses.pitch_rad) > limit or abs(roll - senses.roll_rad) > limit or front < 0.0:
+        # The station's lights can be seen from its front only.
+        if abs(pitch - senses.pitch_rad) > limit or abs(roll - senses.roll_rad) > limit or T[0, 3] < 0.0:
             return None
         yaw = math.atan2(float(R_station_body[1, 0]), float(R_station_body[0, 0]))
         noise = self._cfg.inflation * cov + np.diag(self._floor)
@@ -190,12 +201,6 @@ class RelativeFilter:
         select = np.zeros((4, 6))
         select[:3, :3] = np.eye(3)
         select[3, 3:] = -T[2, :3]
-        return RelativeState(
-            (x, y, z),
-            math.remainder(senses.yaw_rad - yaw, math.tau),
-            select @ noise @ select.T,
-            0.0,
-            1,
-            0,
-            restarts,
-        )
+        axis_yaw_rad = math.remainder(senses.yaw_rad - yaw, math.tau)
+        belief = RelativeBelief(T[:3, 3], axis_yaw_rad, select @ noise @ select.T)
+        return RelativeState(belief.packed(), 0.0, 1, 0, restarts)

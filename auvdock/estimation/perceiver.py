@@ -1,11 +1,12 @@
-"""What perceives in each kind of docking: detectors and perception behind one call."""
+"""What perceives in each kind of docking: detectors, perception and, for landings, their filter behind one call."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
 from auvdock.core.contracts import Detector, Percept, Sensed
-from auvdock.perception.landing.pipeline import LandingPercept, LandingPerception
+from auvdock.estimation.landing.estimator import LandingEstimator
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.perception.landing.tag_detectors import TagDetector
 from auvdock.perception.pipeline import BeaconPerception
 
@@ -44,7 +45,7 @@ class BeaconPerceiver:
 class LandingPerceiver:
     """A `Perceiver` of a platform's lights and its tag."""
 
-    def __init__(self, detector: Detector, tag_detector: TagDetector, perception: LandingPerception) -> None:
+    def __init__(self, detector: Detector, tag_detector: TagDetector, perception: LandingEstimator) -> None:
         """Put the detectors of lights and tags, which read frames, before `perception`."""
         self._detector, self._tag_detector, self._perception = detector, tag_detector, perception
 

@@ -13,9 +13,10 @@ from landing_scenes import CAMERA, STATION, Descent, Senses
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Detections, PoseEstimate, TagDetection
 from auvdock.core.errors import ConfigError
+from auvdock.estimation.landing.estimator import LandingEstimator
+from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.perception.landing.config import Fusion, LandingPerceptionCfg
 from auvdock.perception.landing.level import pose_offset
-from auvdock.perception.landing.pipeline import LandingPercept, LandingPerception
 
 
 def descent(rng: np.random.Generator, end_height_m: float = 0.6) -> Descent:
@@ -33,11 +34,11 @@ def fly(cfg: LandingPerceptionCfg, seed: int, seconds: float = 15.0) -> list[tup
     rng = np.random.default_rng(seed)
     flight = descent(rng)
     senses = Senses(flight, rng)
-    perception = LandingPerception(cfg, CAMERA, STATION)
+    estimator = LandingEstimator(cfg, CAMERA, STATION)
     frames: list[tuple[Array, LandingPercept]] = []
     for k in range(round(20 * seconds)):
         t = k / 20
-        percept = perception.update(senses.lights(t), senses.tags(t), senses.proprioception(t))
+        percept = estimator.update(senses.lights(t), senses.tags(t), senses.proprioception(t))
         frames.append((flight.camera(t), percept))
     return frames
 
@@ -62,11 +63,11 @@ def test_nothing_seen():
     """Searching for ever, no pose, no bearing."""
     rng = np.random.default_rng(0)
     senses = Senses(descent(rng), rng)
-    perception = LandingPerception(LandingPerceptionCfg(), CAMERA, STATION)
+    estimator = LandingEstimator(LandingPerceptionCfg(), CAMERA, STATION)
     for k in range(100):
-        percept = perception.update(Detections.empty(), (), senses.proprioception(k / 20))
+        percept = estimator.update(Detections.empty(), (), senses.proprioception(k / 20))
         assert (percept.status, percept.level, percept.pose, percept.long_range) == ("searching", "none", None, None)
-        assert perception.tag_regions(senses.proprioception(k / 20)) == ()
+        assert estimator.tag_regions(senses.proprioception(k / 20)) == ()
 
 
 def test_held_then_lost_then_found_again():
@@ -75,13 +76,13 @@ def test_held_then_lost_then_found_again():
     rng = np.random.default_rng(5)
     flight = descent(rng)
     senses = Senses(flight, rng)
-    perception = LandingPerception(cfg, CAMERA, STATION)
+    estimator = LandingEstimator(cfg, CAMERA, STATION)
     status: list[str] = []
     for k in range(200):
         t = k / 20
         blind = 100 <= k < 150
         lights = Detections.empty() if blind else senses.lights(t)
-        percept = perception.update(lights, () if blind else senses.tags(t), senses.proprioception(t))
+        percept = estimator.update(lights, () if blind else senses.tags(t), senses.proprioception(t))
         status.append(percept.status)
         assert (percept.pose is None) == (percept.status in ("searching", "lost"))
         if percept.status == "holding":
@@ -105,27 +106,48 @@ def test_one_level_is_enough():
         rng = np.random.default_rng(7)
         flight = dataclasses.replace(descent(rng), end_height_m=1.6)
         senses = Senses(flight, rng)
-        perception = LandingPerception(
-            LandingPerceptionCfg(max_missed_lights_n=10, max_missed_tag_n=10), CAMERA, STATION
-        )
+        estimator = LandingEstimator(LandingPerceptionCfg(max_missed_lights_n=10, max_missed_tag_n=10), CAMERA, STATION)
         for k in range(200):
             t = k / 20
             lights = Detections.empty() if gone == "lights" and k >= 100 else senses.lights(t)
             tags = () if gone == "tag" and k >= 100 else senses.tags(t)
-            percept = perception.update(lights, tags, senses.proprioception(t))
+            percept = estimator.update(lights, tags, senses.proprioception(t))
             if k >= 100:
                 assert (percept.status, percept.level) == ("tracking", "tag" if gone == "lights" else "lights")
+
+
+def test_one_wrong_pose_is_refused_and_a_lasting_one_believed():
+    """The tag seems to lie 0.3 m off: single frames change nothing, `reset_after_n` in a row start the belief anew."""
+    rng = np.random.default_rng(3)
+    flight = Descent(np.array([0.0, 0.0, 2.0]), 0.0, 2.0)
+    senses = Senses(flight, rng)
+    cfg = LandingPerceptionCfg(levels="tag")
+    estimator = LandingEstimator(cfg, CAMERA, STATION)
+    shift_px = 0.3 / 2.0 * float(CAMERA.matrix[0, 0])
+    patience = cfg.filter.reset_after_n
+    for k in range(60 + patience):
+        (tag,) = senses.tags(k / 20)
+        wrong = k in (30, 40) or k >= 60
+        if wrong:
+            tag = dataclasses.replace(tag, corners_px=tag.corners_px + np.array([0.0, shift_px]))
+        percept = estimator.update(Detections.empty(), (tag,), senses.proprioception(k / 20))
+        assert percept.pose is not None
+        error_m = float(np.linalg.norm(percept.pose.T_station_camera[:3, 3] - flight.camera(k / 20)[:3, 3]))
+        last = k == 59 + patience
+        assert percept.pose.measured is (not wrong or last)
+        assert percept.restarts == (1 if last else 0)
+        assert (error_m > 0.2) is last
 
 
 def test_other_tags_are_ignored():
     rng = np.random.default_rng(2)
     flight = Descent(np.array([0.0, 0.0, 2.0]), 0.0, 2.0)
     senses = Senses(flight, rng)
-    perception = LandingPerception(LandingPerceptionCfg(levels="tag"), CAMERA, STATION)
+    estimator = LandingEstimator(LandingPerceptionCfg(levels="tag"), CAMERA, STATION)
     for k in range(20):
         (tag,) = senses.tags(k / 20)
         other = TagDetection(tag.tag_id + 1, tag.corners_px, tag.sigma_px)
-        percept = perception.update(Detections.empty(), (other,), senses.proprioception(k / 20))
+        percept = estimator.update(Detections.empty(), (other,), senses.proprioception(k / 20))
         assert percept.pose is None
 
 

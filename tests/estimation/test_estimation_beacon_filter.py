@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from auvdock.controllers.rotating.beacon_filter import BeaconFilter, BeaconFilterCfg, Sighting
 from auvdock.core.errors import ConfigError
+from auvdock.estimation.beacon_filter import BeaconFilter, BeaconFilterCfg, Sighting
 
 CFG = BeaconFilterCfg()
 DT_S = 1.0 / 30.0

@@ -6,7 +6,7 @@ then (Peach 1995, "Bearings-only tracking using a set of range-parameterised ext
 
 The state of each filter is (b_x, b_y, ψ_s): beacon relative to the camera in level compass axes, and compass yaw of the
 station's x axis. In these axes dead reckoning is linear: b ← b − displacement over ground. A fix measures
-β = atan2(b_y, b_x) and A = β + π − ψ_s.
+β = atan2(b_y, b_x) and A = β + π − ψ_s. Each filter's arithmetic is filterpy's.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
 
 from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
@@ -23,7 +24,6 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.limits import Count, Positive
 
 __all__ = ["BeaconFilter", "BeaconFilterCfg", "BeaconState", "Hypothesis", "Sighting"]
-
 
 _POSE_SIGMA_RAD = 0.02
 """Standard deviation of the axis that the array's poses leave behind (ours)."""
@@ -307,25 +307,33 @@ def _update(
     h: Hypothesis, way: tuple[float, float], process: Array, noise: Array, sighting: Sighting
 ) -> tuple[float, float, Hypothesis]:
     """One filter's squared Mahalanobis distance, log likelihood and posterior with its old weight."""
-    x, y, psi = h.mean[0] - way[0], h.mean[1] - way[1], h.mean[2]
-    square = max(x * x + y * y, 1.0)
-    covariance = h.covariance + process
-    slope = np.array([[-y / square, x / square, 0.0], [-y / square, x / square, -1.0]])
-    bearing = math.atan2(y, x)
-    innovation = np.array(
-        [
-            math.remainder(sighting.bearing_rad - bearing, math.tau),
-            math.remainder(sighting.azimuth_rad - (bearing + math.pi - psi), math.tau),
-        ]
-    )
+    kalman = ExtendedKalmanFilter(dim_x=3, dim_z=2)
+    kalman.x = np.array([h.mean[0] - way[0], h.mean[1] - way[1], h.mean[2]])
+    kalman.P, kalman.Q = h.covariance, process
+    kalman.predict()
     # A bearing error enters the azimuth only through ψ_s: the two measurements are independent of each other.
-    spread = slope @ covariance @ slope.T + noise
-    inverse = np.linalg.inv(spread)
-    gain = covariance @ slope.T @ inverse
-    step = gain @ innovation
-    distance = float(innovation @ inverse @ innovation)
-    keep = np.eye(3) - gain @ slope
-    after = keep @ covariance @ keep.T + gain @ noise @ gain.T
-    mean = (x + float(step[0]), y + float(step[1]), math.remainder(psi + float(step[2]), math.tau))
-    log_chance = -0.5 * (distance + math.log(float(np.linalg.det(spread))))
-    return distance, log_chance, Hypothesis(h.weight, mean, after)
+    fix = np.array([sighting.bearing_rad, sighting.azimuth_rad])
+    kalman.update(fix, _slopes, _angles, noise, residual=_turn)
+    x, y, psi = kalman.x.tolist()
+    distance = float(kalman.y @ kalman.SI @ kalman.y)
+    # ln N(y; 0, S) but for a constant; filterpy's own goes through SciPy and costs as much as all the rest.
+    log_chance = -0.5 * (distance + math.log(float(np.linalg.det(kalman.S))))
+    return distance, log_chance, Hypothesis(h.weight, (x, y, math.remainder(psi, math.tau)), kalman.P)
+
+
+def _angles(state: Array) -> Array:
+    """(2,) bearing and azimuth of a state (3,)."""
+    bearing = math.atan2(state[1], state[0])
+    return np.array([bearing, bearing + math.pi - state[2]])
+
+
+def _slopes(state: Array) -> Array:
+    """(2, 3) ∂ `_angles` / ∂ state."""
+    x, y, _ = state.tolist()
+    square = max(x * x + y * y, 1.0)
+    return np.array([[-y / square, x / square, 0.0], [-y / square, x / square, -1.0]])
+
+
+def _turn(measured: Array, expected: Array) -> Array:
+    """(2,) differences of angles, within ±π."""
+    return np.array([math.remainder(a - b, math.tau) for a, b in zip(measured, expected, strict=True)])

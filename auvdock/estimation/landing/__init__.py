@@ -1,0 +1,1 @@
+"""What a landing vehicle believes of its place above the platform."""
