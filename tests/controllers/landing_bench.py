@@ -86,7 +86,7 @@ class Eye:
         glance = look(self.name, T_station_body, rng)
         self.filter.predict(senses)
         if glance.pose is not None:
-            known = np.diag(1.0 / np.diag(glance.pose.covariance))
+            known = np.linalg.inv(glance.pose.covariance).astype(np.float64)
             level = LevelPose(glance.pose, known, np.zeros(6), np.zeros((6, 6)), np.zeros(0), 0.0)
             if self.filter.running:
                 self.filter.update([self.filter.compare(level, senses)])
