@@ -12,6 +12,8 @@ at any range, and among a dozen spurious lights some four lie like four of six b
 5. chance: identities that are handed out anew must be far likelier than spurious lights in those places. That is the
    score of multiple-hypothesis tracking (Reid 1979; Blackman & Popoli 1999, section 6.2), with the pose, which nobody
    knows beforehand, integrated out by Laplace's approximation.
+
+All four stand on a light's σ, which is learnt from the poses before: see `Credibility.noise_after`.
 """
 
 from __future__ import annotations
@@ -31,12 +33,15 @@ from auvdock.perception.pnp import PnpSolution
 
 __all__ = ["Credibility", "CredibilityCfg"]
 
-_UNIT_FRAMES = 15.0
-"""Length of the running mean of the noise (ours)."""
-_LEAST_UNIT, _GREATEST_UNIT = 0.08, 2.0
-"""The mean is kept within these bounds, and ..."""
-_UNIT_MARGIN = 2.0
-"""... taken twice, since it is known from few frames: noise counts as 0.4 times σ_px at least, twice at most (ours)."""
+_NOISE_FRAMES = 15.0
+"""Length of the running mean of the lights' variance (ours)."""
+_NOISE_MARGIN = 8.0
+"""A light counts as so many times the variance that is shown: of the centres that `ThresholdDetector` finds, one in a
+hundred is off by 10 times the median, since flakes and neighbours' halos shift it (ours)."""
+_LEAST_NOISE, _GREATEST_NOISE = 0.08, 4.0
+"""σ stays within 0.28 and 2 times σ_px (ours)."""
+_MOST_SURPRISE = 9.0
+"""One frame counts at most as three times the σ that is known, believed or not: strays must not widen it (ours)."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +117,7 @@ class Credibility:
         """Mean of χ² at the pose of so many lights: their coordinates and the prior's, less the pose's six."""
         return self._freedom[lights]
 
-    def follows(
-        self, solution: PnpSolution, before: PnpSolution, way_m: Array, elapsed_s: float, unit_variance: float = 1.0
-    ) -> bool:
+    def follows(self, solution: PnpSolution, before: PnpSolution, way_m: Array, elapsed_s: float) -> bool:
         """Whether the vehicle can have come here from an earlier pose.
 
         The step less the way by DVL, in excess of what that way may be wrong, must be noise of both poses' lights. The
@@ -126,7 +129,6 @@ class Credibility:
             before: the earlier one.
             way_m: (3,) way since then in the station frame.
             elapsed_s: time since then.
-            unit_variance: of the lights' noise over what σ_px says, see `unit_variance_after`.
         """
         step = solution.T_station_camera()[:3, 3] - before.T_station_camera()[:3, 3] - way_m
         length_m = math.sqrt(float(step @ step))
@@ -135,15 +137,14 @@ class Credibility:
             return True
         along = step / length_m
         variance = self._noise_along(solution, along) + self._noise_along(before, along)
-        return excess_m**2 <= self._worst_step * _UNIT_MARGIN * unit_variance * variance
+        return excess_m**2 <= self._worst_step * variance
 
-    def is_alone(self, solution: PnpSolution, mirrored: PnpSolution | None, unit_variance: float = 1.0) -> bool:
+    def is_alone(self, solution: PnpSolution, mirrored: PnpSolution | None) -> bool:
         """Whether a pose is far likelier than the other pose of its plane, or both are one.
 
         Args:
             solution: the pose.
             mirrored: the other one, see `PnpSolver.mirrored`.
-            unit_variance: of the lights' noise over what σ_px says, see `unit_variance_after`.
         """
         if mirrored is None:
             return True
@@ -151,20 +152,30 @@ class Credibility:
         apart_m = float(np.linalg.norm(mirrored.T_station_camera()[:3, 3] - position))
         if apart_m <= max(self._cfg.max_range_sigma_m, self._cfg.max_range_sigma * float(np.linalg.norm(position))):
             return True
-        scale = min(_UNIT_MARGIN * unit_variance, 1.0)
-        return mirrored.cost - solution.cost >= 2.0 * self._cfg.mirror_log_odds * scale
+        return mirrored.cost - solution.cost >= 2.0 * self._cfg.mirror_log_odds
 
-    def unit_variance_after(self, unit_variance: float, solution: PnpSolution) -> float:
-        """What is known of the noise after one more pose: a running mean of χ² / (2 n - 6) (Mehra 1970), in bounds.
+    def noise_after(self, noise: float, solution: PnpSolution, sigma_px: Array) -> float:
+        """What is known of the variance of a light's place, over σ_px², after one more pose: in bounds, with a margin.
 
-        σ_px is set for the worst that lights may do; in clear water they do ten times better, and a step that noise of
-        σ_px could explain is none of theirs. The prior adds to χ², so that the mean is too great rather than too small.
+        A running mean of the lights' χ² over its expectation (Mehra 1970). That is 2 n - 6 + tr (P Σ)², with P the
+        weight of the attitude prior and Σ the pose's covariance: what of the rotation the prior decides, the lights do
+        not. σ_px is set for the worst that lights may do. In clear water they do twenty times better: what noise of
+        σ_px could explain is none of theirs, and a prior that weighs too much against them biases the pose.
+
+        Args:
+            noise: what was known before.
+            solution: a pose, believed or not.
+            sigma_px: (n,) σ of its lights as it was solved with them, √noise σ_px for those that are nothing special.
         """
-        freedom = 2.0 * len(solution.residual_px) - 6.0
+        freedom = 2.0 * len(sigma_px) - 6.0
+        if self._attitude_sigma_rad > 0.0:
+            by_prior = solution.covariance()[3:, 3:].ravel() / self._attitude_sigma_rad**2
+            freedom += min(float(by_prior @ by_prior), 3.0)
         if freedom <= 0.0:
-            return unit_variance
-        mean = unit_variance + (solution.cost / freedom - unit_variance) / _UNIT_FRAMES
-        return min(max(mean, _LEAST_UNIT), _GREATEST_UNIT)
+            return noise
+        misfit = solution.residual_px / sigma_px
+        shown = min(_NOISE_MARGIN * float(misfit @ misfit) / freedom, _MOST_SURPRISE)
+        return min(max(noise * (1.0 + (shown - 1.0) / _NOISE_FRAMES), _LEAST_NOISE), _GREATEST_NOISE)
 
     def _noise_along(self, solution: PnpSolution, along: Array) -> float:
         """Variance of the position along a direction (3,) that the noise of the lights makes, m²."""

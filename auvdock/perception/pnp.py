@@ -53,10 +53,13 @@ class PnpCfg(Checked):
     """Trust in the vehicle's own attitude when it decides between the two poses of a plane."""
     max_attitude_error_deg: Positive = 40.0
     """A pose turned farther than this from the vehicle's own attitude is refused."""
-    attitude_prior_sigma_deg: NotNegative = 5.0
+    attitude_prior_sigma_deg: NotNegative = 2.0
     """The vehicle's attitude enters the least squares with this σ per axis; 0 leaves the pose to light alone, as in
-    paper A. Beyond some 8 m light alone hardly tells how the array is turned, and the two poses of its plane melt into
-    one that may be 30° off and carries the position with it."""
+    paper A. Beyond some 8 m light alone hardly tells how the array is turned: the two poses of its plane melt into one
+    that may be 30° off and carries the position with it, and a flake of marine snow that shifts one light by 2 px turns
+    the pose by several degrees. The value is ours: compass and inclinometer are good to 0.5° (`SensorCfg`), the rest is
+    for the camera's mounting and the survey of the station. It must be well below 6°, for a turn by 6° moves the
+    position by a tenth of the range, which no test of the range sees."""
 
 
 class PnpSolution(NamedTuple):

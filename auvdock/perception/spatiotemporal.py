@@ -15,7 +15,7 @@ from auvdock.perception.authentication import AuthenticationCfg, Authenticator
 from auvdock.perception.credibility import Credibility, CredibilityCfg
 from auvdock.perception.labelled import labelled_lights
 from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
-from auvdock.perception.pnp_refine import SEEN
+from auvdock.perception.pnp_refine import SEEN, SIGMA
 from auvdock.perception.tracker import LightTracker
 
 __all__ = ["SpatiotemporalAssociation"]
@@ -79,7 +79,7 @@ class SpatiotemporalAssociation:
         self._believed: PnpSolution | None = None
         self._age = 0
         self._way_m: Array = np.zeros(3)
-        self._unit_variance = 1.0
+        self._noise = 1.0
         self._doubted = 0
         self._heading_known = True
 
@@ -98,7 +98,7 @@ class SpatiotemporalAssociation:
         self._way_m = rotation_prior.T @ velocity_m_s * (self._age / self._rate_hz)
         if self._age > _MAX_POSE_AGE:
             self._last = self._believed = None
-            self._unit_variance = 1.0
+            self._noise = 1.0
         result = self._solve_labelled(tracks, detections, rotation_prior)
         if result is None and self._authenticate(tracks, rotation_prior):
             result = self._solve_labelled(tracks, detections, rotation_prior)
@@ -106,7 +106,6 @@ class SpatiotemporalAssociation:
             return Associated()
         if result.solution is not None and result.array_count >= _MIN_LIT:
             self._last = self._believed = result.solution
-            self._unit_variance = self._credibility.unit_variance_after(self._unit_variance, result.solution)
             self._age = 0
             if result.array_count < len(self._array_m):
                 self._reacquire(tracks, result.solution)
@@ -121,7 +120,7 @@ class SpatiotemporalAssociation:
             detections.xyxy,
             self._size_px,
             self._array_m,
-            self._sigma_px,
+            self._sigma_px * math.sqrt(self._noise),
         )
         count = len(lights)
         if count == 0:
@@ -136,13 +135,16 @@ class SpatiotemporalAssociation:
             there = lights[:, SEEN] > 0.0
             alone = self._solved(lights[there], seen, prior)
             if alone is not None and self._is_believed(alone):
-                solution, owners, lights = alone, owners[there], lights[there]
+                solution, lights, owners = alone, lights[there], owners[there]
         believed = solution is not None and self._is_believed(solution)
         if seen >= 5 and not believed:
-            better, rest = self._without_worst(tracks, lights, owners, prior)
+            better, worst = self._without_worst(lights, prior)
             if better is not None:
-                lights = lights[np.isin(owners[:, 1], rest[:, 1])]
-                solution, owners, seen, believed = better, rest, len(rest), True
+                tracks.beacon_id[owners[worst, 0]] = -1
+                lights, owners = np.delete(lights, worst, axis=0), np.delete(owners, worst, axis=0)
+                solution, seen, believed = better, len(owners), True
+        if solution is not None and seen >= _MIN_LIT:
+            self._noise = self._credibility.noise_after(self._noise, solution, lights[:, SIGMA])
         if not believed:
             self._doubted += 1
             if solution is not None and self._doubted <= _MAX_DOUBTED:
@@ -155,7 +157,6 @@ class SpatiotemporalAssociation:
             solution, is_alone = self._likelier(solution, lights, prior)
             if not is_alone:
                 self._last, self._believed, self._age = solution, None, 0
-                self._unit_variance = self._credibility.unit_variance_after(self._unit_variance, solution)
                 return Associated()
         ids = tuple(owners[:, 1].tolist())
         return Associated(pose_estimate(solution, ids, seen >= _MIN_LIT), seen, solution)
@@ -174,20 +175,16 @@ class SpatiotemporalAssociation:
     def _follows(self, solution: PnpSolution) -> bool:
         """Whether a pose can come after the last one that was believed."""
         before, elapsed_s = self._believed, self._age / self._rate_hz
-        return before is None or self._credibility.follows(
-            solution, before, self._way_m, elapsed_s, self._unit_variance
-        )
+        return before is None or self._credibility.follows(solution, before, self._way_m, elapsed_s)
 
     def _likelier(self, solution: PnpSolution, lights: Array, prior: Array) -> tuple[PnpSolution, bool]:
         """The likelier of a pose and the other one of its plane, and whether it is so by far."""
         other = self._solver.mirrored(solution, lights, prior)
         if other is not None and other.cost < solution.cost:
             solution, other = other, solution
-        return solution, self._credibility.is_alone(solution, other, self._unit_variance)
+        return solution, self._credibility.is_alone(solution, other)
 
-    def _without_worst(
-        self, tracks: LightTracker, lights: Array, owners: IntArray, prior: Array
-    ) -> tuple[PnpSolution | None, IntArray]:
+    def _without_worst(self, lights: Array, prior: Array) -> tuple[PnpSolution | None, int]:
         """Leave one of the seen lights out: a single stray light must not cost the identities of all."""
         best: PnpSolution | None = None
         left_out = 0
@@ -197,10 +194,7 @@ class SpatiotemporalAssociation:
                 continue
             if best is None or solution.error_px < best.error_px:
                 best, left_out = solution, index
-        if best is None:
-            return None, owners
-        tracks.beacon_id[owners[left_out, 0]] = -1
-        return best, np.delete(owners, left_out, axis=0)
+        return best, left_out
 
     def _authenticate(self, tracks: LightTracker, prior: Array) -> bool:
         """Name the beacons among the unnamed; True if a proposal holds."""
@@ -220,6 +214,7 @@ class SpatiotemporalAssociation:
                 found = np.flatnonzero(identity >= 0)
                 tracks.beacon_id[:] = -1
                 tracks.beacon_id[chosen[identity[found]]] = found
+                self._doubted = 0
                 return True
         return False
 

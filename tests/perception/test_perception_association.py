@@ -23,8 +23,13 @@ from perception_scenes import (
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import RED, Detections, Percept
 from auvdock.core.errors import ConfigError
+from auvdock.perception.authentication import AuthenticationCfg
+from auvdock.perception.credibility import CredibilityCfg
 from auvdock.perception.hungarian_ransac import HungarianRansacCfg
 from auvdock.perception.pipeline import ASSOCIATIONS, AssociationName, BeaconPerception, PerceptionCfg
+from auvdock.perception.pnp import PnpCfg
+from auvdock.perception.spatiotemporal import SpatiotemporalAssociation
+from auvdock.perception.tracker import LightTracker, TrackerCfg
 
 RING = LAYOUT.positions_m[ARRAY]
 RING_AND_FAR = LAYOUT.positions_m[[*ARRAY, FAR]]
@@ -262,6 +267,32 @@ def test_comparison_rejects_a_stray_by_ransac():
     assert percept.pose is not None
     assert sorted(percept.pose.beacon_ids) == [0, 1, 2, 3, 5]
     assert position_error_m(percept, run.truth) < 0.6
+
+
+def test_new_identities_start_without_the_doubt_of_the_old():
+    """Four lights jump as by half a metre: their names go, and come again when the last pose is too old to contradict.
+
+    A doubted pose in the very frame of the new names does not cost them at once: four in a row would.
+    """
+    rng = np.random.default_rng(18)
+    tracks = LightTracker(TrackerCfg(), CAMERA.rate_hz, CAMERA.width_px, CAMERA.height_px)
+    names = SpatiotemporalAssociation(AuthenticationCfg(), PnpCfg(), CredibilityCfg(), 0.5, CAMERA, LAYOUT)
+    seen: list[int] = []
+    for frame in range(40):
+        truth = Motion(np.array([8.0 if frame < 12 else 7.5, 0.0, 0.0]), np.array([0.0, 0.0, np.pi]), *np.zeros((2, 3)))
+        detections, _ = blue_detections(rng, pixels_of(truth.at(0.0)[0], RING[[0, 1, 3, 4]]), 0.02)
+        tracks.update(detections)
+        if frame > 12 and seen[-1] == 0:
+            # What is measured now contradicts the tracks, on which new names rest.
+            moved = detections.centre_px.copy()
+            moved[0] += np.array([4.0, 0.0])
+            detections = replace(detections, centre_px=moved)
+        found = names.update(tracks, detections, truth.at(0.0)[0][:3, :3].T, np.zeros(3))
+        seen.append(int(np.count_nonzero(tracks.beacon_id >= 0)))
+        if frame > 13 and seen[-2] == 0 < seen[-1]:
+            assert found.pose is None
+            return
+    pytest.fail(f"names never came again: {seen}")
 
 
 def test_predicted_places_that_disagree_with_what_is_seen_are_left_out():
