@@ -185,7 +185,9 @@ class Autopilot:
             heave = min(bound, max(-bound, self._depth_gain * (senses.depth_m - setpoint.depth_m)))
         wrench, memory = np.zeros(6), LoopMemory.zeros()
         wanted = Wanted(
-            (setpoint.surge_m_s, setpoint.sway_m_s, heave),
+            setpoint.surge_m_s,
+            setpoint.sway_m_s,
+            heave,
             setpoint.through_water,
             setpoint.roll_rad,
             setpoint.pitch_rad,

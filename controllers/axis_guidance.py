@@ -104,14 +104,19 @@ class AxisCourse(NamedTuple):
     """What to do along the approach axis.
 
     Attributes:
-        course: level velocity and heading.
+        surge_m_s: over ground, ahead.
+        sway_m_s: to port.
         heave_m_s: upwards.
-        integrals: of the line of sight, port and up.
+        offset_rad: wanted heading less the axis', positive to port.
+        port_integral, up_integral: of the line of sight.
     """
 
-    course: Course
+    surge_m_s: float
+    sway_m_s: float
     heave_m_s: float
-    integrals: tuple[float, float]
+    offset_rad: float
+    port_integral: float
+    up_integral: float
 
 
 def axis_law(
@@ -283,4 +288,4 @@ def axis_course(
         bearing, view = math.atan2(-place.port_m, distance_m), cfg.max_view_angle_rad
     window = bearing - view, bearing + view
     course = crab(forward, port, axis_yaw_rad, limit, turn_rad, current_m_s, cfg.reach_m_s, window)
-    return AxisCourse(course, up, (port_after, up_after))
+    return AxisCourse(course.surge_m_s, course.sway_m_s, up, course.offset_rad, port_after, up_after)

@@ -90,7 +90,9 @@ class LoopMemory(Record):
 class Wanted(NamedTuple):
     """Set-points; the speeds are those of the level heading frame, ahead, to port, up."""
 
-    speeds_m_s: tuple[float, float, float]
+    surge_m_s: float
+    sway_m_s: float
+    heave_m_s: float
     through_water: bool
     """Whether these speeds are through the water, not over ground."""
     roll_rad: float
@@ -135,12 +137,12 @@ def body_wrench(
         flow = world[i, 0] * ahead + world[i, 1] * port + world[i, 2] * up
         current[i] = last.current_m_s[i] + smoothing * (flow - last.current_m_s[i])
     # References move towards the set-point at a bounded rate, not far from the measured speed.
-    inertia = np.empty(3)
+    speeds, inertia = (wanted.surge_m_s, wanted.sway_m_s, wanted.heave_m_s), np.empty(3)
     for i in range(3):
         bound = cfg.surge_acceleration_m_s2 if i == 0 else cfg.sway_acceleration_m_s2
         speed = level[i, 0] * measured[0] + level[i, 1] * measured[1] + level[i, 2] * measured[2]
         reference = last.references_m_s[i]
-        moved = reference + limited(wanted.speeds_m_s[i] - reference, bound * dt_s)
+        moved = reference + limited(speeds[i] - reference, bound * dt_s)
         references[i] = speed + limited(moved - speed, cfg.max_speed_error_m_s)
         inertia[i] = cfg.drag.inertia_kg[i] * limited((references[i] - reference) / dt_s, bound)
     aim, drift, push, weight = back(level, references), back(world, current), back(level, inertia), np.zeros(3)

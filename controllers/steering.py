@@ -227,10 +227,11 @@ def along_axis(
         law: from `axis_guidance.axis_law`.
     """
     turn = math.remainder(senses.yaw_rad - place.axis_yaw_rad, math.tau)
-    course, heave, integrals = axis_course(law, place, integrals, hold, committed, lookahead_m, turn, current_m_s)
-    heading = place.axis_yaw_rad + course.offset_rad
-    setpoint = AutopilotSetpoint(course.surge_m_s, course.sway_m_s, heave, 0.0, heading)
-    return Steering(setpoint, Line(integrals, course.offset_rad))
+    surge, sway, heave, offset, port_integral, up_integral = axis_course(
+        law, place, integrals, hold, committed, lookahead_m, turn, current_m_s
+    )
+    setpoint = AutopilotSetpoint(surge, sway, heave, 0.0, place.axis_yaw_rad + offset)
+    return Steering(setpoint, Line((port_integral, up_integral), offset))
 
 
 def back_off(place: Place, senses: Senses, current_m_s: Vector, reach_m_s: float, cfg: GuidanceCfg) -> Steering:

@@ -94,8 +94,7 @@ def course(place, integrals=(0.0, 0.0), hold=False, committed=False, turn=0.0, c
     """On an axis that leads east: surge, sway, heave, heading offset, integrals."""
     distance, port, up = place
     at = Place(distance, port, up, 0.0, turn, math.hypot(port, up))
-    level, heave, after = axis_course(LAW, at, integrals, hold, committed, CFG.lookahead_mid_m, turn, (*current, 0.0))
-    return level.surge_m_s, level.sway_m_s, heave, level.offset_rad, *after
+    return axis_course(LAW, at, integrals, hold, committed, CFG.lookahead_mid_m, turn, (*current, 0.0))
 
 
 @settings(deadline=None)  # the first call may compile
