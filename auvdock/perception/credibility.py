@@ -98,7 +98,7 @@ class Credibility:
         cfg = self._cfg
         position = solution.T_station_camera()[:3, 3]
         range_m = math.sqrt(float(position @ position))
-        if solution.cost > self._worst_fit[len(solution.residual_px)] or range_m > cfg.max_range_m:
+        if solution.cost > self._worst_fit[solution.lights_n] or range_m > cfg.max_range_m:
             return False
         variance = float(position @ solution.covariance()[:3, :3] @ position) / range_m**2
         return variance <= max(cfg.max_range_sigma_m, cfg.max_range_sigma * range_m) ** 2
@@ -138,7 +138,7 @@ class Credibility:
         σ_px is set for the worst that lights may do; in clear water they do ten times better, and a step that noise of
         σ_px could explain is none of theirs. The prior adds to χ², so that the mean is too great rather than too small.
         """
-        freedom = 2.0 * len(solution.residual_px) - 6.0
+        freedom = 2.0 * solution.lights_n - 6.0
         if freedom <= 0.0:
             return unit_variance
         mean = unit_variance + (solution.cost / freedom - unit_variance) / _UNIT_FRAMES
@@ -175,7 +175,7 @@ class Credibility:
             sigma_px: σ of a light's place per axis.
             heading_sigma_rad: σ of the prior about the station's upright axis where it is worse than the rest.
         """
-        n = len(solution.residual_px)
+        n = solution.lights_n
         found = self._cfg.detection_probability
         each = math.log(found * self._area_px / (2.0 * math.pi * (n + len(others_px))))
         log_pose = 3.0 * math.log(2.0 * math.pi) + 0.5 * float(np.linalg.slogdet(solution.covariance())[1])

@@ -10,12 +10,13 @@ from auvdock.core.arrays import Array, IntArray
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, Detections
+from auvdock.numeric.lights import Light
+from auvdock.numeric.records import Records
 from auvdock.perception.association import Associated, pose_estimate
 from auvdock.perception.authentication import AuthenticationCfg, Authenticator
 from auvdock.perception.credibility import Credibility, CredibilityCfg
-from auvdock.perception.labelled import labelled_lights
-from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
-from auvdock.perception.pnp_refine import SEEN
+from auvdock.perception.labelled import Owner, gather_lights
+from auvdock.perception.pnp import Attitude, PnpCfg, PnpSolution, PnpSolver
 from auvdock.perception.tracker import LightTracker
 
 __all__ = ["SpatiotemporalAssociation"]
@@ -85,20 +86,18 @@ class SpatiotemporalAssociation:
         self,
         tracks: LightTracker,
         detections: Detections,
-        rotation_prior: Array,
+        attitude: Attitude,
         velocity_m_s: Array,
-        heading_sigma_rad: float | None = None,
     ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`."""
-        self._solver.heading_sigma_rad = heading_sigma_rad
         self._age += 1
-        self._way_m = rotation_prior.T @ velocity_m_s * (self._age / self._rate_hz)
+        self._way_m = attitude.rotation.T @ velocity_m_s * (self._age / self._rate_hz)
         if self._age > _MAX_POSE_AGE:
             self._last = self._believed = None
             self._unit_variance = 1.0
-        result = self._solve_labelled(tracks, detections, rotation_prior)
-        if result is None and self._authenticate(tracks, rotation_prior):
-            result = self._solve_labelled(tracks, detections, rotation_prior)
+        result = self._solve_labelled(tracks, detections, attitude)
+        if result is None and self._authenticate(tracks, attitude):
+            result = self._solve_labelled(tracks, detections, attitude)
         if result is None:
             return Associated()
         if result.solution is not None and result.array_count >= _MIN_LIT:
@@ -109,11 +108,10 @@ class SpatiotemporalAssociation:
                 self._reacquire(tracks, result.solution)
         return result
 
-    def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Array) -> Associated | None:
+    def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Attitude) -> Associated | None:
         """Pose from the tracks that carry an identity; clears all identities and returns None if it does not hold."""
-        lights, owners, seen = labelled_lights(
-            tracks.numbers,
-            tracks.labels,
+        lights, owners, seen = gather_lights(
+            tracks.table,
             detections.centre_px,
             detections.xyxy,
             self._size_px,
@@ -130,7 +128,7 @@ class SpatiotemporalAssociation:
             return None
         solution = self._solved(lights, seen, prior)
         if seen == _MIN_LIT < count and (solution is None or solution.cost > self._credibility.expected_cost(count)):
-            there = lights[:, SEEN] > 0.0
+            there = lights["is_seen"]
             alone = self._solved(lights[there], seen, prior)
             if alone is not None and self._is_believed(alone):
                 solution, owners = alone, owners[there]
@@ -147,10 +145,10 @@ class SpatiotemporalAssociation:
         if solution is None or not believed:
             return None
         self._doubted = 0
-        ids = tuple(owners[:, 1].tolist())
+        ids = tuple(owners["beacon"].tolist())
         return Associated(pose_estimate(solution, ids, seen >= _MIN_LIT), seen, solution)
 
-    def _solved(self, lights: Array, seen: int, prior: Array) -> PnpSolution | None:
+    def _solved(self, lights: Records[Light], seen: int, prior: Attitude) -> PnpSolution | None:
         """The pose of the given lights if those of them that were seen reproject well."""
         solution = self._solver.solve_lights(lights, prior, self._last)
         if solution is None or (seen and solution.error_px > self._pnp.max_reprojection_px):
@@ -169,34 +167,34 @@ class SpatiotemporalAssociation:
         )
 
     def _without_worst(
-        self, tracks: LightTracker, lights: Array, owners: IntArray, prior: Array
-    ) -> tuple[PnpSolution | None, IntArray]:
+        self, tracks: LightTracker, lights: Records[Light], owners: Records[Owner], prior: Attitude
+    ) -> tuple[PnpSolution | None, Records[Owner]]:
         """Leave one of the seen lights out: a single stray light must not cost the identities of all."""
         best: PnpSolution | None = None
-        left_out = 0
+        left_out, every = 0, np.arange(len(lights))
         for index in range(len(lights)):
-            solution = self._solved(np.delete(lights, index, axis=0), len(lights) - 1, prior)
+            solution = self._solved(lights[every != index], len(lights) - 1, prior)
             if solution is None or not self._is_believed(solution):
                 continue
             if best is None or solution.error_px < best.error_px:
                 best, left_out = solution, index
         if best is None:
             return None, owners
-        tracks.beacon_id[owners[left_out, 0]] = -1
-        return best, np.delete(owners, left_out, axis=0)
+        tracks.beacon_id[owners["track"][left_out]] = -1
+        return best, owners[every != left_out]
 
-    def _authenticate(self, tracks: LightTracker, prior: Array) -> bool:
+    def _authenticate(self, tracks: LightTracker, prior: Attitude) -> bool:
         """Name the beacons among the unnamed; True if a proposal holds."""
         if len(tracks) < self._cfg.min_beacons:
             return False
         chosen = self._authenticator.candidates(tracks)
         if len(chosen) < self._cfg.min_beacons:
             return False
-        pixels = tracks.state[chosen, :2]
+        pixels = tracks.centre_px[chosen]
         blue = np.flatnonzero(tracks.class_id == BLUE)
-        others = tracks.state[np.setdiff1d(blue, chosen), :2]
+        others = tracks.centre_px[np.setdiff1d(blue, chosen)]
         self._last = None
-        for identity in self._authenticator.propose(self._camera.normalise(pixels), prior):
+        for identity in self._authenticator.propose(self._camera.normalise(pixels), prior.rotation):
             settled = self._settle(pixels, identity, prior, others)
             if settled is not None:
                 identity, self._last = settled
@@ -207,7 +205,7 @@ class SpatiotemporalAssociation:
         return False
 
     def _settle(
-        self, pixels: Array, identity: IntArray, prior: Array, others_px: Array
+        self, pixels: Array, identity: IntArray, prior: Attitude, others_px: Array
     ) -> tuple[IntArray, PnpSolution] | None:
         """Solve, look again where all beacons must be, and solve again; None if the identities do not hold.
 
@@ -227,17 +225,19 @@ class SpatiotemporalAssociation:
                 return None
             again = self._match(solution, pixels)
             if np.array_equal(again, identity):
-                return (identity, solution) if self._likely(solution, identity, pixels, others_px) else None
+                return (identity, solution) if self._likely(solution, identity, prior, pixels, others_px) else None
             identity = again
         return None
 
-    def _likely(self, solution: PnpSolution, identity: IntArray, pixels: Array, others_px: Array) -> bool:
+    def _likely(
+        self, solution: PnpSolution, identity: IntArray, prior: Attitude, pixels: Array, others_px: Array
+    ) -> bool:
         """Whether new identities hold: a good fit, and far likelier than spurious lights in those places."""
         if solution.error_px > self._pnp.max_reprojection_px or not self._is_believed(solution):
             return False
         unused = np.setdiff1d(np.arange(len(self._blue_m)), np.flatnonzero(identity >= 0))
         others_px = np.vstack([np.delete(pixels, identity[identity >= 0], axis=0), others_px])
-        odds = self._credibility.log_odds(solution, unused, others_px, self._sigma_px, self._solver.heading_sigma_rad)
+        odds = self._credibility.log_odds(solution, unused, others_px, self._sigma_px, prior.heading_sigma_rad)
         return odds >= self._min_log_odds
 
     def _match(self, solution: PnpSolution, pixels: Array) -> IntArray:
@@ -263,7 +263,7 @@ class SpatiotemporalAssociation:
         ).nonzero()[0]
         if len(fresh) == 0:
             return
-        identity = self._match(solution, tracks.state[fresh, :2])
+        identity = self._match(solution, tracks.centre_px[fresh])
         carried = tracks.beacon_id[tracks.detection >= 0]
         for beacon in np.flatnonzero(identity >= 0):
             if beacon not in carried:

@@ -27,7 +27,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 from auvdock.perception.credibility import Credibility, CredibilityCfg
 from auvdock.perception.pipeline import ASSOCIATIONS, BeaconPerception, PerceptionCfg
-from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
+from auvdock.perception.pnp import Attitude, PnpCfg, PnpSolution, PnpSolver
 
 RING = LAYOUT.positions_m[ARRAY]
 BLUE_LAMPS = LAYOUT.positions_m[[*ARRAY, FAR]]
@@ -49,7 +49,9 @@ def turned(rng: np.random.Generator, sigma_rad: float) -> Array:
 
 def solved(T_station_camera: Array, prior: Array, noise_px: Array, beacons: IntArray) -> PnpSolution:
     pixels = pixels_of(T_station_camera, RING[beacons]) + noise_px
-    solution = PnpSolver(PnpCfg(), CAMERA).solve(RING[beacons], pixels, np.full(len(beacons), SIGMA_PX), prior)
+    solution = PnpSolver(PnpCfg(), CAMERA).solve(
+        RING[beacons], pixels, np.full(len(beacons), SIGMA_PX), Attitude(prior)
+    )
     assert solution is not None
     return solution
 
@@ -76,7 +78,9 @@ def test_of_right_poses_as_many_are_doubted_as_noise_explains():
 @pytest.mark.parametrize("distance_m", [70.0, 400.0, 4e4])
 def test_a_pose_beyond_the_reach_of_light_is_not_believed(credibility: Credibility, distance_m: float):
     truth = looking_at_the_ring(distance_m)
-    solution = PnpSolver(PnpCfg(), CAMERA).solve(RING, pixels_of(truth, RING), np.full(6, 0.01), truth[:3, :3].T)
+    solution = PnpSolver(PnpCfg(), CAMERA).solve(
+        RING, pixels_of(truth, RING), np.full(6, 0.01), Attitude(truth[:3, :3].T)
+    )
     assert solution is None or not credibility.holds(solution)
 
 
@@ -85,7 +89,7 @@ def test_a_range_is_believed_as_far_as_the_span_of_the_lights_tells_it(credibili
     for distance_m in (5.0, 8.0, 14.0, 20.0):
         truth = looking_at_the_ring(distance_m)
         pixels = pixels_of(truth, RING)
-        solution = PnpSolver(PnpCfg(), CAMERA).solve(RING, pixels, np.full(6, 4.0), truth[:3, :3].T)
+        solution = PnpSolver(PnpCfg(), CAMERA).solve(RING, pixels, np.full(6, 4.0), Attitude(truth[:3, :3].T))
         assert solution is not None
         share = 4.0 / math.sqrt(float(((pixels - pixels.mean(axis=0)) ** 2).sum()))
         assert credibility.holds(solution) == (share < 0.1), (distance_m, share)
