@@ -32,7 +32,7 @@ from typing import Any
 
 from auvdock.numeric.warning import AuvdockWarning
 
-__all__ = ["FolderState", "KeptCode", "KeptCodeWarning", "examine_folder"]
+__all__ = ["ROOM", "FolderState", "KeptCode", "KeptCodeWarning", "examine_folder", "hash_of", "is_whole", "said"]
 
 _caching: Any = import_module("numba.core.caching")
 _config: Any = import_module("numba.core.config")
@@ -42,7 +42,8 @@ _dumps: Callable[[object], bytes] = import_module("numba.core.serialize").dumps
 _user_dirs: Any = import_module("numba.misc.appdirs").AppDirs
 
 _FORMAT = b"auvdock 2"
-_ROOM = Path(__file__).resolve().parent
+ROOM = Path(__file__).resolve().parent
+"""The shared room."""
 _HASH_BYTES = 32
 _SUFFIX = ".nbc"
 _TAG = sys.implementation.cache_tag
@@ -68,7 +69,7 @@ class KeptCode(_caching._Cache):
         self._function = function
         self._source = source
         self._enabled = True
-        parts = (_FORMAT, _numba.__version__.encode(), source.read_bytes(), function.__code__.co_code, _hash_of(_ROOM))
+        parts = (_FORMAT, _numba.__version__.encode(), source.read_bytes(), function.__code__.co_code, hash_of(ROOM))
         self._stamp = _hash(parts)
 
     @property
@@ -95,7 +96,7 @@ class KeptCode(_caching._Cache):
             except OSError as error:
                 _leave_aside(folder, f"cannot be read ({error.strerror or error})")
                 continue
-            if not _is_whole(content):
+            if not is_whole(content):
                 _leave_aside(folder, "is damaged")
             elif content[_HASH_BYTES : 2 * _HASH_BYTES] == self._stamp:
                 try:
@@ -158,7 +159,7 @@ def _fields(kinds: Any) -> list[object]:  # noqa: ANN401
 
 
 @lru_cache(maxsize=1)
-def _hash_of(room: Path) -> bytes:
+def hash_of(room: Path) -> bytes:
     """Hash of a folder's Python files, their names included; read once, as a process loads them once."""
     parts: list[bytes] = []
     for path in sorted(room.glob("*.py")):
@@ -203,14 +204,15 @@ def examine_folder(folder: Path) -> FolderState:
     whole = damaged = 0
     for path in folder.glob(f"*.{_TAG}-*{_SUFFIX}"):
         try:
-            is_whole = _is_whole(path.read_bytes())
+            good = is_whole(path.read_bytes())
         except OSError:
-            is_whole = False
-        whole, damaged = whole + is_whole, damaged + (not is_whole)
+            good = False
+        whole, damaged = whole + good, damaged + (not good)
     return FolderState(whole, damaged, _unwritable(folder, 1 << 20))
 
 
-def _is_whole(content: bytes) -> bool:
+def is_whole(content: bytes) -> bool:
+    """Whether a file's content is as it was written."""
     body = content[_HASH_BYTES:]
     return len(body) > _HASH_BYTES and hashlib.sha256(body).digest() == content[:_HASH_BYTES]
 
@@ -241,11 +243,11 @@ def _leave_aside(folder: Path, why: str) -> None:
     _say("read", f"compiled code in {folder} {why}; it is left aside, inner loops are compiled anew")
 
 
-_said: set[str] = set()
+said: set[str] = set()
 """What this process has warned of: all its functions share their folders, and compiling resets Python's own memory."""
 
 
 def _say(kind: str, text: str) -> None:
-    if kind not in _said:
-        _said.add(kind)
+    if kind not in said:
+        said.add(kind)
         warnings.warn(text, KeptCodeWarning, stacklevel=3)

@@ -34,9 +34,13 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
-__all__ = ["Record", "Records"]
+__all__ = ["Record", "Records", "new_rows"]
 
 _R = TypeVar("_R", bound="Record")
+
+new_rows: Any = np.zeros
+"""`numpy.zeros`, by which kernels make records: `lamps: Records[Lamp] = new_rows(3, dtype=_LAMP)` with the global
+`_LAMP = Lamp.dtype()`. Type checkers take what it gives for records."""
 
 if TYPE_CHECKING:
 
@@ -46,10 +50,10 @@ if TYPE_CHECKING:
         @typing.overload
         def __getitem__(self, index: int) -> _R: ...
         @typing.overload
-        def __getitem__(self, index: slice) -> Records[_R]: ...
+        def __getitem__(self, index: slice | np.ndarray[Any, Any]) -> Records[_R]: ...
         @typing.overload
-        def __getitem__(self, index: str) -> np.ndarray[Any, Any]: ...
-        def __getitem__(self, index: int | slice | str) -> Any:
+        def __getitem__(self, index: str) -> Any: ...  # noqa: ANN401 - of numbers, or of records again
+        def __getitem__(self, index: int | slice | np.ndarray[Any, Any] | str) -> Any:
             """A row, an array of some rows, or the array of one field in all of them."""
 
         def __setitem__(self, index: int | slice | str, value: object) -> None:
@@ -59,9 +63,21 @@ if TYPE_CHECKING:
             """How many rows."""
             return 0
 
+        def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray[Any, Any]:  # noqa: ANN401
+            """The array, as NumPy's own functions take it."""
+            return np.empty(0)
+
         def copy(self) -> Records[_R]:
             """An array of its own with the same rows."""
             return self
+
+        def tobytes(self) -> bytes:
+            """The rows' bytes."""
+            return b""
+
+        def tolist(self) -> list[Any]:
+            """The rows as tuples."""
+            return []
 
 else:
 

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Detections, PoseEstimate
-from auvdock.perception.pnp import PnpSolution
+from auvdock.perception.pnp import Attitude, PnpSolution
 from auvdock.perception.tracker import LightTracker
 
 __all__ = ["Associated", "Association", "pose_estimate"]
@@ -37,18 +37,16 @@ class Association(Protocol):
         self,
         tracks: LightTracker,
         detections: Detections,
-        rotation_prior: Array,
+        attitude: Attitude,
         velocity_m_s: Array,
-        heading_sigma_rad: float | None = None,
     ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`.
 
         Args:
             tracks: the lights, updated with this frame.
             detections: the frame's.
-            rotation_prior: (3, 3) R_camera_station of the vehicle's own attitude.
+            attitude: the vehicle's own.
             velocity_m_s: (3,) velocity over ground in the camera frame, as the vehicle's DVL measures it.
-            heading_sigma_rad: standard deviation of the station's heading in it, None where it was surveyed.
         """
         ...
 

@@ -70,7 +70,7 @@ class Authenticator:
     def candidates(self, tracks: LightTracker) -> IntArray:
         """Rows of the tracks that are seen often and surely enough, surest first (algorithm 1, lines 1 to 7)."""
         cfg = self._cfg
-        return surest_lights(tracks.numbers, tracks.labels, cfg.min_occurrences, cfg.min_confidence, cfg.max_candidates)
+        return surest_lights(tracks.table, tracks.scores, cfg.min_occurrences, cfg.min_confidence, cfg.max_candidates)
 
     def propose(self, xy: Array, rotation: Array) -> IntArray:
         """Possible identities, best first.

@@ -6,54 +6,89 @@ others the pixels form runs; runs that touch those of the row above, corners inc
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from auvdock.core.arrays import Image, IntArray
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.records import Record, Records, new_rows
 
-__all__ = ["components", "peaked_components"]
+__all__ = ["Component", "Peak", "components", "components_and_peaks"]
+
+
+@dataclass
+class Component(Record):
+    """Box and size of a component, in px."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+    area: int
+
+
+@dataclass
+class Peak(Record):
+    """The brightest pixel of a component, of equals the first row by row, and what else is asked of its pixels."""
+
+    code: int
+    column: int
+    row: int
+    marks: int
+    """How many of the marked pixels it holds."""
+
+
+@dataclass
+class _Run(Record):
+    """Pixels side by side in one row that all stand above the threshold."""
+
+    first: int
+    """Column."""
+    end: int
+    """One column past the last."""
+    row: int
+    earlier: int
+    """A run of the same component that is not after this one; the component's first is its own."""
+    component: int
+
+
+_COMPONENT, _PEAK, _RUN = Component.dtype(), Peak.dtype(), _Run.dtype()
 
 
 @compiled
-def components(image: Image, threshold: float) -> IntArray:
-    """(k, 5) left, top, width, height and area of the components of `image` (h, w) above a threshold.
+def components(image: Image, threshold: float) -> Records[Component]:
+    """(k,) components of `image` (h, w) above a threshold.
 
     Pixels that touch at a side or a corner belong together. The order is that of the components' first pixels, row by
     row from the top, each from the left.
     """
-    run = _joined(image, int(np.floor(threshold)))
-    place, count = _places(run)
-    return _boxes(run, place, count)
+    runs = _runs(image, int(np.floor(threshold)))
+    return _boxes(runs, _number(runs))
 
 
 @compiled
-def peaked_components(image: Image, threshold: float, taken: IntArray) -> IntArray:
-    """(k, 9) `components`, with each one's brightest pixel and what it holds of the pixels `taken` (m, 2), column, row.
-
-    After the five numbers of `components` come the peak's code, column and row, of equals the first, and how many of
-    the pixels that were taken it holds.
-    """
-    run = _joined(image, int(np.floor(threshold)))
-    place, count = _places(run)
-    found = np.zeros((count, 9), dtype=np.int64)
-    found[:, :5] = _boxes(run, place, count)
-    for k in range(len(run)):
-        first, last, row = run[k, 0], run[k, 1], run[k, 2]
-        entry = found[place[k]]
-        for x in range(first, last):
-            if image[row, x] > entry[5]:
-                entry[5], entry[6], entry[7] = image[row, x], x, row
-        for column, line in taken:
-            if line == row and first <= column < last:
-                entry[8] += 1
-    return found
+def components_and_peaks(image: Image, threshold: float, marks: IntArray) -> tuple[Records[Component], Records[Peak]]:
+    """`components` and their peaks (k,), with how many of the pixels `marks` (m, 2), column and row, each holds."""
+    runs = _runs(image, int(np.floor(threshold)))
+    count = _number(runs)
+    peaks: Records[Peak] = new_rows(count, dtype=_PEAK)
+    for run in runs:
+        peak = peaks[run.component]
+        for x in range(run.first, run.end):
+            if image[run.row, x] > peak.code:
+                peak.code, peak.column, peak.row = image[run.row, x], x, run.row
+        for m in range(len(marks)):
+            if marks[m, 1] == run.row and run.first <= marks[m, 0] < run.end:
+                peak.marks += 1
+    return _boxes(runs, count), peaks
 
 
 @compiled
-def _joined(image: Image, level: int) -> IntArray:
-    """(n, 4) runs above a level: first column, one past the last, row, and a run of the component not after this."""
+def _runs(image: Image, level: int) -> Records[_Run]:
+    """(n,) runs above a level, those that touch joined."""
     height, width = image.shape
-    run = np.empty((_count_runs(image, level), 4), dtype=np.int64)
+    runs: Records[_Run] = new_rows(_count_runs(image, level), dtype=_RUN)
     count = above = row_start = 0
     for y in range(height):
         above, row_start = row_start, count
@@ -68,16 +103,17 @@ def _joined(image: Image, level: int) -> IntArray:
             start = x
             while x < width and line[x] > level:
                 x += 1
-            run[count, 0], run[count, 1], run[count, 2], run[count, 3] = start, x, y, count
-            while above < row_start and run[above, 1] < start:
+            run = runs[count]
+            run.first, run.end, run.row, run.earlier = start, x, y, count
+            while above < row_start and runs[above].end < start:
                 above += 1
             other = above
-            while other < row_start and run[other, 0] <= x:
-                one, two = _root(run, other), _root(run, count)
-                run[max(one, two), 3] = min(one, two)
+            while other < row_start and runs[other].first <= x:
+                one, two = _root(runs, other), _root(runs, count)
+                runs[max(one, two)].earlier = min(one, two)
                 other += 1
             count += 1
-    return run
+    return runs
 
 
 @compiled
@@ -97,42 +133,38 @@ def _count_runs(image: Image, level: int) -> int:
 
 
 @compiled
-def _root(run: IntArray, index: int) -> int:
+def _root(runs: Records[_Run], index: int) -> int:
     """The component's first run; halves the path to it."""
-    while run[index, 3] != index:
-        run[index, 3] = run[run[index, 3], 3]
-        index = run[index, 3]
+    while runs[index].earlier != index:
+        runs[index].earlier = runs[runs[index].earlier].earlier
+        index = runs[index].earlier
     return index
 
 
 @compiled
-def _places(run: IntArray) -> tuple[IntArray, int]:
-    """(n,) the component of each run, and how many there are."""
-    place = np.empty(len(run), dtype=np.int64)
+def _number(runs: Records[_Run]) -> int:
+    """Number the components by their first runs and tell each run its component's; how many there are."""
     count = 0
-    for k in range(len(run)):
-        root = _root(run, k)
+    for k in range(len(runs)):
+        root = _root(runs, k)
         if root == k:
-            place[k] = count
+            runs[k].component = count
             count += 1
         else:
-            place[k] = place[root]
-    return place, count
+            runs[k].component = runs[root].component
+    return count
 
 
 @compiled
-def _boxes(run: IntArray, place: IntArray, count: int) -> IntArray:
+def _boxes(runs: Records[_Run], count: int) -> Records[Component]:
     """`components` of joined runs."""
-    found = np.zeros((count, 5), dtype=np.int64)
-    for k in range(len(run)):
-        first, last, row = run[k, 0], run[k, 1], run[k, 2]
-        box = found[place[k]]
-        if box[4] == 0:
-            box[0], box[1], box[2] = first, row, last
-        # Until the end, columns 2 and 3 hold where the box ends.
-        box[0], box[2], box[3] = min(box[0], first), max(box[2], last), row + 1
-        box[4] += last - first
-    for box in found:
-        box[2] -= box[0]
-        box[3] -= box[1]
+    found: Records[Component] = new_rows(count, dtype=_COMPONENT)
+    for run in runs:
+        box = found[run.component]
+        right = max(box.left + box.width, run.end)
+        if box.area == 0:
+            box.left, box.top, right = run.first, run.row, run.end
+        box.left = min(box.left, run.first)
+        box.width, box.height = right - box.left, run.row + 1 - box.top
+        box.area += run.end - run.first
     return found

@@ -104,7 +104,7 @@ class Credibility:
         cfg = self._cfg
         position = solution.T_station_camera()[:3, 3]
         range_m = math.sqrt(float(position @ position))
-        if solution.cost > self._worst_fit[len(solution.residual_px)] or range_m > cfg.max_range_m:
+        if solution.cost > self._worst_fit[solution.lights_n] or range_m > cfg.max_range_m:
             return False
         covariance = solution.covariance()[:3, :3]
         if heading_known:
@@ -154,7 +154,7 @@ class Credibility:
             return True
         return mirrored.cost - solution.cost >= 2.0 * self._cfg.mirror_log_odds
 
-    def noise_after(self, noise: float, solution: PnpSolution, sigma_px: Array) -> float:
+    def noise_after(self, noise: float, solution: PnpSolution) -> float:
         """What is known of the variance of a light's place, over σ_px², after one more pose: in bounds, with a margin.
 
         A running mean of the lights' χ² over its expectation (Mehra 1970). That is 2 n - 6 + tr (P Σ)², with P the
@@ -163,18 +163,16 @@ class Credibility:
         σ_px could explain is none of theirs, and a prior that weighs too much against them biases the pose.
 
         Args:
-            noise: what was known before.
+            noise: what was known before, and what the lights were solved with: σ of √noise σ_px.
             solution: a pose, believed or not.
-            sigma_px: (n,) σ of its lights as it was solved with them, √noise σ_px for those that are nothing special.
         """
-        freedom = 2.0 * len(sigma_px) - 6.0
+        freedom = 2.0 * solution.lights_n - 6.0
         if self._attitude_sigma_rad > 0.0:
             by_prior = solution.covariance()[3:, 3:].ravel() / self._attitude_sigma_rad**2
             freedom += min(float(by_prior @ by_prior), 3.0)
         if freedom <= 0.0:
             return noise
-        misfit = solution.residual_px / sigma_px
-        shown = min(_NOISE_MARGIN * float(misfit @ misfit) / freedom, _MOST_SURPRISE)
+        shown = min(_NOISE_MARGIN * solution.lights_cost / freedom, _MOST_SURPRISE)
         return min(max(noise * (1.0 + (shown - 1.0) / _NOISE_FRAMES), _LEAST_NOISE), _GREATEST_NOISE)
 
     def _noise_along(self, solution: PnpSolution, along: Array) -> float:
@@ -208,7 +206,7 @@ class Credibility:
             sigma_px: σ of a light's place per axis.
             heading_sigma_rad: σ of the prior about the station's upright axis where it is worse than the rest.
         """
-        n = len(solution.residual_px)
+        n = solution.lights_n
         found = self._cfg.detection_probability
         each = math.log(found * self._area_px / (2.0 * math.pi * (n + len(others_px))))
         log_pose = 3.0 * math.log(2.0 * math.pi) + 0.5 * float(np.linalg.slogdet(solution.covariance())[1])

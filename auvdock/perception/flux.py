@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,29 @@ _EDGES = np.array([0.0, 0.12, 0.2, 0.3, 0.42, 0.56, 0.76, 1.0, 1.4, 2.0, 2.8, 4.
 _DISC = 7
 _AROUND = 8
 _FIT_RINGS = 3
+
+
+class _Box(NamedTuple):
+    """Part of an image in px, upper bounds excluded."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+
+class _Rings(NamedTuple):
+    """What rings about a place hold, and last of all what lies beyond them (k + 1,).
+
+    Attributes:
+        pixels: how many.
+        electrons: their electrons.
+        burnt: those of them that are saturated.
+    """
+
+    pixels: Array
+    electrons: Array
+    burnt: Array
 
 
 def spot_flux(frame: Frame, centre_px: Array, disc_rad: float = DISC_RAD) -> Array:
@@ -51,22 +75,20 @@ def _above(frame: Frame, u: float, v: float, radius: float, table: Array, wide: 
     last = len(_EDGES) - 1 if wide else _AROUND + 1
     reach = math.ceil(float(_EDGES[last]) * radius) + 1
     left, top = max(round(u) - reach, 0), max(round(v) - reach, 0)
-    right, bottom = min(round(u) + reach + 1, width), min(round(v) + reach + 1, height)
-    if right - left < 2 or bottom - top < 2:
+    box = _Box(left, top, min(round(u) + reach + 1, width), min(round(v) + reach + 1, height))
+    if box.right - left < 2 or box.bottom - top < 2:
         return 0.0
-    channel = int(_channel_sums(frame.image, left, top, right, bottom).argmax())
-    edges_px = _EDGES[: last + 1] * radius
-    count, total, saturated = _rings(frame.image, left, top, right, bottom, channel, u, v, edges_px, table)
-    if not wide and saturated.any():
+    channel = int(_channel_sums(frame.image, box).argmax())
+    rings = _measure_rings(frame.image, box, channel, u, v, _EDGES[: last + 1] * radius, table)
+    if not wide and rings.burnt.any():
         return _above(frame, u, v, radius, table, True)
-    count, total, saturated = count[:last], total[:last], saturated[:last]
-    mean = total / np.maximum(count, 1.0)
-    shown = count > 0.0
+    mean = rings.electrons[:last] / np.maximum(rings.pixels[:last], 1.0)
+    shown = rings.pixels[:last] > 0.0
     if not shown[_AROUND] and not wide:
         return 0.0
     if wide:
         background = float(np.median(table[frame.image[::16, ::16, channel]]))
-        mean = _mended(mean, shown, saturated > 0.0, background)
+        mean = _extrapolate(mean, shown, rings.burnt[:last] > 0.0, background)
     elif not shown.all():
         mean = np.interp(_MIDDLE[:last], _MIDDLE[:last][shown], mean[shown])
     areas = math.pi * radius**2 * np.diff(_EDGES[: _DISC + 1] ** 2)
@@ -76,7 +98,7 @@ def _above(frame: Frame, u: float, v: float, radius: float, table: Array, wide: 
 _MIDDLE = 0.5 * (_EDGES[1:] + _EDGES[:-1])
 
 
-def _mended(mean: Array, shown: BoolArray, burnt: BoolArray, background: float) -> Array:
+def _extrapolate(mean: Array, shown: BoolArray, burnt: BoolArray, background: float) -> Array:
     """Ring means with the saturated ones extrapolated from outside."""
     first = int(np.flatnonzero(burnt)[-1]) + 1
     good = np.flatnonzero(shown & (np.arange(len(mean)) >= first))
@@ -88,52 +110,38 @@ def _mended(mean: Array, shown: BoolArray, burnt: BoolArray, background: float) 
     slope = -1.0
     if len(fit) >= 2:
         slope = min(float(np.polyfit(_MIDDLE[fit], np.log(light), 1)[0]), 0.0)
-    mended = np.interp(_MIDDLE, _MIDDLE[good], mean[good])
+    means = np.interp(_MIDDLE, _MIDDLE[good], mean[good])
     inner = slice(0, int(fit[0]))
-    mended[inner] = floor + light[0] * np.exp(slope * (_MIDDLE[inner] - _MIDDLE[fit[0]]))
-    return mended
+    means[inner] = floor + light[0] * np.exp(slope * (_MIDDLE[inner] - _MIDDLE[fit[0]]))
+    return means
 
 
 @compiled
-def _channel_sums(image: Image, left: int, top: int, right: int, bottom: int) -> IntArray:
-    """(3,) sums of the codes in a box, upper bounds excluded."""
+def _channel_sums(image: Image, box: _Box) -> IntArray:
+    """(3,) sums of the codes in a box."""
     sums = np.zeros(3, dtype=np.int64)
-    for y in range(top, bottom):
-        for x in range(left, right):
+    for y in range(box.top, box.bottom):
+        for x in range(box.left, box.right):
             for channel in range(3):
                 sums[channel] += image[y, x, channel]
     return sums
 
 
 @compiled
-def _rings(
-    image: Image,
-    left: int,
-    top: int,
-    right: int,
-    bottom: int,
-    channel: int,
-    u: float,
-    v: float,
-    edges_px: Array,
-    table: Array,
-) -> tuple[Array, Array, Array]:
-    """Pixels, electrons and saturated pixels (k + 1,) of a box by rings, and of what lies beyond the last.
-
-    The rings lie about (u, v) between radii `edges_px` (k + 1,), the first 0; the box excludes its upper bounds.
-    """
-    rings = len(edges_px) - 1
-    count, total, saturated = np.zeros(rings + 1), np.zeros(rings + 1), np.zeros(rings + 1)
+def _measure_rings(image: Image, box: _Box, channel: int, u: float, v: float, edges_px: Array, table: Array) -> _Rings:
+    """Rings about (u, v) between radii `edges_px` (k + 1,), the first 0, and what of a box lies beyond the last."""
+    last = len(edges_px) - 1
+    rings = _Rings(np.zeros(last + 1), np.zeros(last + 1), np.zeros(last + 1))
     edges2 = edges_px * edges_px
-    for y in range(top, bottom):
-        for x in range(left, right):
+    for y in range(box.top, box.bottom):
+        for x in range(box.left, box.right):
             distance2 = (x - u) * (x - u) + (y - v) * (y - v)
             ring = 0
-            while ring < rings and distance2 >= edges2[ring + 1]:
+            while ring < last and distance2 >= edges2[ring + 1]:
                 ring += 1
             code = image[y, x, channel]
-            count[ring] += 1.0
-            total[ring] += table[code]
+            rings.pixels[ring] += 1.0
+            rings.electrons[ring] += table[code]
             if code >= SATURATED_CODE:
-                saturated[ring] += 1.0
-    return count, total, saturated
+                rings.burnt[ring] += 1.0
+    return rings

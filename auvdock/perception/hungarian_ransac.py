@@ -22,7 +22,7 @@ from auvdock.core.contracts import BLUE, Detections
 from auvdock.core.limits import Count, Positive
 from auvdock.perception.association import Associated, pose_estimate
 from auvdock.perception.credibility import Credibility, CredibilityCfg
-from auvdock.perception.pnp import PnpCfg, PnpSolver
+from auvdock.perception.pnp import Attitude, PnpCfg, PnpSolver
 from auvdock.perception.solvers import ransac
 from auvdock.perception.tracker import LightTracker
 
@@ -79,17 +79,15 @@ class HungarianRansacAssociation:
         self,
         tracks: LightTracker,
         detections: Detections,
-        rotation_prior: Array,
+        attitude: Attitude,
         velocity_m_s: Array,
-        heading_sigma_rad: float | None = None,
     ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`."""
-        self._solver.heading_sigma_rad = heading_sigma_rad
         tracks.beacon_id[:] = -1
         blue = np.flatnonzero(detections.class_id == BLUE)
-        result, ids, chosen = self._named(detections, *self._carry(detections, blue), rotation_prior)
+        result, ids, chosen = self._named(detections, *self._carry(detections, blue), attitude)
         if len(ids) < len(self._array_m) <= len(blue) or result is None:
-            named = self._named(detections, *self._by_angle(detections, blue, rotation_prior), rotation_prior)
+            named = self._named(detections, *self._by_angle(detections, blue, attitude.rotation), attitude)
             if result is None or (named[0] is not None and len(named[1]) > len(ids)):
                 result, ids, chosen = named
         if result is None:
@@ -103,7 +101,7 @@ class HungarianRansacAssociation:
         return result
 
     def _named(
-        self, detections: Detections, ids: IntArray, chosen: IntArray, prior: Array
+        self, detections: Detections, ids: IntArray, chosen: IntArray, prior: Attitude
     ) -> tuple[Associated | None, IntArray, IntArray]:
         """The pose of named lights, and those of them that it bears out; None if the names do not hold.
 
@@ -140,7 +138,7 @@ class HungarianRansacAssociation:
         error = [float(np.sum(1.0 - np.cos(seen - np.roll(known, shift)))) for shift in range(k)]
         return np.roll(beacons, int(np.argmin(error))), chosen
 
-    def _solve(self, ids: IntArray, pixels: Array, prior: Array) -> tuple[Associated, IntArray] | None:
+    def _solve(self, ids: IntArray, pixels: Array, prior: Attitude) -> tuple[Associated, IntArray] | None:
         if len(ids) < 4:
             return None
         xy = self._camera.normalise(pixels)

@@ -3,30 +3,42 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
-import numpy as np
-
-from auvdock.core.arrays import Array, IntArray
+from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
-from auvdock.numeric.lights import PIXEL, SEEN, SIGMA
-from auvdock.numeric.tracks import BEACON_ID, COVARIANCE, DETECTION
+from auvdock.numeric.lights import Light
+from auvdock.numeric.records import Record, Records, new_rows
+from auvdock.numeric.tracks import Track
 
-__all__ = ["labelled_lights"]
+__all__ = ["Owner", "gather_lights"]
 
 _MIN_SEEN = 4
 """From this many beacons on, those seen in this frame stand alone."""
 
 
+@dataclass
+class Owner(Record):
+    """Where a light's identity comes from."""
+
+    track: int
+    """Row of its track."""
+    beacon: int
+    """The array's beacon."""
+
+
+_LIGHT, _OWNER = Light.dtype(), Owner.dtype()
+
+
 @compiled
-def labelled_lights(
-    numbers: Array,
-    labels: IntArray,
+def gather_lights(
+    tracks: Records[Track],
     centre_px: Array,
     xyxy: Array,
     size_px: tuple[int, int],
     array_m: Array,
     sigma_px: float,
-) -> tuple[Array, IntArray, int]:
+) -> tuple[Records[Light], Records[Owner], int]:
     """The array beacons among the tracks, in the order of their ids.
 
     Those that were seen in this frame if they are four or more; else predicted ones as well, at their track's place and
@@ -34,8 +46,7 @@ def labelled_lights(
     part that is left: off by up to half of the box.
 
     Args:
-        numbers: (n, 7 or more) of the tracks, as `LightTracker.numbers`.
-        labels: (n, 6) of the tracks, as `LightTracker.labels`.
+        tracks: (n,) tracks.
         centre_px: (m, 2) this frame's detections.
         xyxy: (m, 4) their boxes, px.
         size_px: width and height of the picture.
@@ -43,34 +54,36 @@ def labelled_lights(
         sigma_px: σ of a detection.
 
     Returns:
-        Table (l, 7) of lights as `PnpSolver.solve_lights` takes it; their tracks and beacons (l, 2); how many were
-        seen.
+        Lights (l,) as `PnpSolver.solve_lights` takes them; whose they are (l,); how many were seen.
     """
     seen = carried = 0
-    for i in range(len(labels)):
-        if labels[i, BEACON_ID] >= 0:
+    for i in range(len(tracks)):
+        if tracks[i].beacon_id >= 0:
             carried += 1
-            if labels[i, DETECTION] >= 0:
+            if tracks[i].detection >= 0:
                 seen += 1
     count = seen if seen >= _MIN_SEEN else carried
-    lights, owners = np.empty((count, 7)), np.empty((count, 2), dtype=np.int64)
+    lights: Records[Light] = new_rows(count, dtype=_LIGHT)
+    owners: Records[Owner] = new_rows(count, dtype=_OWNER)
     row = 0
     for beacon in range(len(array_m)):
-        for i in range(len(labels)):
-            j = labels[i, DETECTION]
-            if labels[i, BEACON_ID] != beacon or (seen >= _MIN_SEEN and j < 0):
+        for i in range(len(tracks)):
+            track, j = tracks[i], tracks[i].detection
+            if track.beacon_id != beacon or (seen >= _MIN_SEEN and j < 0):
                 continue
-            owners[row, 0], owners[row, 1] = i, beacon
+            owners[row].track, owners[row].beacon = i, beacon
+            light = lights[row]
             for k in range(3):
-                lights[row, k] = array_m[beacon, k]
-            if j >= 0:
-                lights[row, PIXEL], lights[row, PIXEL + 1] = centre_px[j, 0], centre_px[j, 1]
-                lights[row, SIGMA], lights[row, SEEN] = sigma_px, 1.0
+                light.place_m[k] = array_m[beacon, k]
+            light.is_seen = j >= 0
+            for axis in range(2):
+                light.centre_px[axis] = centre_px[j, axis] if j >= 0 else track.centre_px[axis]
+            light.sigma_px = sigma_px
+            if j < 0:
+                light.sigma_px += math.sqrt(track.p00_px2)
+            else:
                 left, top, right, bottom = xyxy[j, 0], xyxy[j, 1], xyxy[j, 2], xyxy[j, 3]
                 if left <= 0.0 or top <= 0.0 or right >= size_px[0] - 1 or bottom >= size_px[1] - 1:
-                    lights[row, SIGMA] += 0.5 * max(right - left, bottom - top)
-            else:
-                lights[row, PIXEL], lights[row, PIXEL + 1] = numbers[i, 0], numbers[i, 1]
-                lights[row, SIGMA], lights[row, SEEN] = sigma_px + math.sqrt(numbers[i, COVARIANCE]), 0.0
+                    light.sigma_px += 0.5 * max(right - left, bottom - top)
             row += 1
     return lights, owners, seen

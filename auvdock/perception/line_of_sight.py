@@ -5,31 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-
 from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.checked import Checked
 from auvdock.core.contracts import Bearing
 from auvdock.core.limits import Count, PositiveShare, at_least
-from auvdock.perception.pnp import PnpSolution
-from auvdock.perception.sights import (
-    CENTRE,
-    ENTRANCE,
-    FOLLOWED,
-    LONG_RANGE,
-    RANGE,
-    RAY,
-    SCORE,
-    find_sights,
-    sight_terms,
-)
+from auvdock.numeric.lights import Solution
+from auvdock.perception.pnp import PnpSolution, lens_of
+from auvdock.perception.sights import ENTRANCE, LONG_RANGE, SightLaw, find_sights, spread_m
 from auvdock.perception.tracker import LightTracker
 
 __all__ = ["LineOfSight", "LineOfSightCfg"]
 
-_NO_POSE = np.zeros(0)
+_NO_SOLUTION = Solution.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -56,7 +45,18 @@ class LineOfSight:
 
     def __init__(self, cfg: LineOfSightCfg, camera: Camera, layout: BeaconLayout) -> None:
         """Precompute the layout's spreads."""
-        self._terms = sight_terms(camera, layout, cfg.min_occurrences, cfg.max_missed, cfg.group_size, cfg.loyalty)
+        lights = layout.positions_m
+        blue, red = list(layout.indices("array") + layout.indices("long_range")), list(layout.indices("entrance"))
+        self._law = SightLaw(
+            lens=lens_of(camera),
+            blue_spread_m=spread_m(lights[blue]),
+            red_spread_m=spread_m(lights[red]) if len(red) > 1 else 0.0,
+            centre_m=layout.array_positions_m.mean(axis=0),
+            min_occurrences=cfg.min_occurrences,
+            max_missed=cfg.max_missed,
+            group_size=cfg.group_size,
+            loyalty=cfg.loyalty,
+        ).packed()
         self.reset()
 
     def reset(self) -> None:
@@ -65,20 +65,14 @@ class LineOfSight:
 
     def update(self, tracks: LightTracker, solution: PnpSolution | None) -> tuple[Bearing | None, Bearing | None]:
         """(long range, entrance) bearings of this frame."""
-        pose = _NO_POSE if solution is None else solution.numbers
-        found = find_sights(tracks.numbers, tracks.labels, pose, self._terms, self._followed)
-        self._followed = int(found.item(FOLLOWED))
-        return _bearing(found, LONG_RANGE), _bearing(found, ENTRANCE)
+        record = _NO_SOLUTION if solution is None else solution.record
+        sights, self._followed = find_sights(tracks.table, tracks.scores, record, self._law, self._followed)
+        rows = sights.tolist()
+        return _bearing(*rows[LONG_RANGE]), _bearing(*rows[ENTRANCE])
 
 
-def _bearing(found: Array, start: int) -> Bearing | None:
+def _bearing(ray_camera: Array, pixel: Array, score: float, range_m: float) -> Bearing | None:
     """One bearing out of what `find_sights` gives."""
-    score, range_m = found.item(start + SCORE), found.item(start + RANGE)
     if score != score:
         return None
-    return Bearing(
-        found[start + RAY : start + CENTRE],
-        found[start + CENTRE : start + SCORE],
-        score,
-        range_m if range_m == range_m else None,
-    )
+    return Bearing(ray_camera, pixel, score, range_m if range_m == range_m else None)

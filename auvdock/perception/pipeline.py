@@ -19,7 +19,7 @@ from auvdock.perception.authentication import AuthenticationCfg
 from auvdock.perception.credibility import CredibilityCfg
 from auvdock.perception.hungarian_ransac import HungarianRansacAssociation, HungarianRansacCfg
 from auvdock.perception.line_of_sight import LineOfSight, LineOfSightCfg
-from auvdock.perception.pnp import PnpCfg
+from auvdock.perception.pnp import Attitude, PnpCfg
 from auvdock.perception.prior import AttitudePrior, FacingHeading
 from auvdock.perception.rotating.config import ForwardBeaconCfg
 from auvdock.perception.rotating.forward_beacon import ForwardBeacon
@@ -113,6 +113,11 @@ class BeaconPerception:
             )
         self._line_of_sight = LineOfSight(cfg.line_of_sight, camera, layout)
 
+    @property
+    def tracks(self) -> LightTracker:
+        """The lights that are followed, with the identities that the association gave them."""
+        return self._tracks
+
     def reset(self) -> None:
         """Forget everything; call at the start of an episode."""
         self._tracks.reset()
@@ -132,13 +137,9 @@ class BeaconPerception:
                 fixed = detections.select(~self._forward.mask)
         tracks.update(fixed)
         velocity = self._camera_body @ proprioception.velocity_ground_m_s
-        if self._surveyed:
-            prior = self._prior.rotation(proprioception)
-            associated = self._association.update(tracks, fixed, prior, velocity)
-        else:
-            heading, sigma = self._heading(proprioception)
-            prior = self._prior.rotation(proprioception, heading)
-            associated = self._association.update(tracks, fixed, prior, velocity, sigma)
+        heading, sigma = (None, None) if self._surveyed else self._heading(proprioception)
+        attitude = Attitude(self._prior.rotation(proprioception, heading), sigma)
+        associated = self._association.update(tracks, fixed, attitude, velocity)
         long_range, entrance = self._line_of_sight.update(tracks, associated.solution)
         self._facing.note(long_range)
         return Percept(

@@ -20,25 +20,15 @@ from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.checked import Checked
 from auvdock.core.limits import NotNegative, Positive
-from auvdock.numeric.lights import (
-    ATTITUDE,
-    COST,
-    COVARIANCE,
-    ERROR,
-    PIXEL,
-    RESIDUAL,
-    ROTATION,
-    SEEN,
-    SIGMA,
-    TRANSFORM,
-    TRANSLATION,
-)
+from auvdock.numeric.lights import Light, Pose, Solution
+from auvdock.numeric.records import Records, new_rows
 from auvdock.numeric.rotations import rotation_of, vector_of
 from auvdock.perception.pnp_refine import solve_from
 from auvdock.perception.solvers import project, solve_pnp
 
-__all__ = ["PnpCfg", "PnpSolution", "PnpSolver", "light_table", "translation_from_rotation"]
+__all__ = ["Attitude", "PnpCfg", "PnpSolution", "PnpSolver", "lens_of", "light_table", "translation_from_rotation"]
 
+_SOLUTION = Solution.dtype()
 _DECREMENT = 1e-9
 _DECREMENT_TRACKED = 1e-4
 
@@ -62,17 +52,32 @@ class PnpCfg(Checked):
     position by a tenth of the range, which no test of the range sees."""
 
 
+class Attitude(NamedTuple):
+    """What the vehicle knows of how the station is turned before it sees a light.
+
+    Attributes:
+        rotation: (3, 3) R_camera_station.
+        heading_sigma_rad: standard deviation of the turn about the station's upright axis, None where it was surveyed
+            and is no worse than the rest.
+    """
+
+    rotation: Array
+    heading_sigma_rad: float | None = None
+
+
 class PnpSolution(NamedTuple):
     """A pose of the station in the camera frame, p_camera = R p_station + t.
 
     Attributes:
-        numbers: (70 + n,) all that `solve_from` tells of it.
+        record: (1,) all that `solve_from` tells of it.
+        lights_n: lights that it was solved from.
         attitude_error_rad: angle to the attitude prior.
         cost: χ² of the reprojection and of the attitude prior, if that is in use.
         solver: name of the solver.
     """
 
-    numbers: Array
+    record: Records[Solution]
+    lights_n: int
     attitude_error_rad: float
     cost: float
     solver: str
@@ -80,39 +85,35 @@ class PnpSolution(NamedTuple):
     @property
     def rotation_vector(self) -> Array:
         """(3,) Rodrigues vector of R."""
-        return self.numbers[:TRANSLATION]
+        return self.record["pose"]["rotation_vector"][0]
 
     @property
     def translation_m(self) -> Array:
         """(3,) t."""
-        return self.numbers[TRANSLATION:ROTATION]
+        return self.record["pose"]["translation_m"][0]
 
     @property
     def rotation(self) -> Array:
         """(3, 3) R."""
-        return self.numbers[ROTATION:TRANSFORM].reshape(3, 3)
+        return self.record["rotation"][0]
 
     @property
-    def residual_px(self) -> Array:
-        """(n,) distance between each light and its reprojection, to a hundredth of its σ."""
-        return self.numbers[RESIDUAL:]
+    def lights_cost(self) -> float:
+        """χ² of the reprojection alone."""
+        return self.record["lights_cost"].item()
 
     @property
     def error_px(self) -> float:
         """Mean residual of the lights that were seen, or of all where none was."""
-        return self.numbers.item(ERROR)
+        return self.record["error_px"].item()
 
     def T_station_camera(self) -> Array:
         """(4, 4) pose of the camera in the station frame: [Rᵀ, -Rᵀ t]."""
-        return self.numbers[TRANSFORM:COVARIANCE].reshape(4, 4)
+        return self.record["T_station_camera"][0]
 
     def covariance(self) -> Array:
-        """(6, 6) covariance of (camera position in the station frame, small rotation in the camera frame).
-
-        With Σ = (JᵀWJ)⁻¹ over (r, t), δ = J_l(r) dr a small rotation of the camera axes: d(position) =
-        -Rᵀ (dt + t × δ), and the camera turns by -δ.
-        """
-        return self.numbers[COVARIANCE:ATTITUDE].reshape(6, 6)
+        """(6, 6) covariance of (camera position in the station frame, small rotation in the camera frame)."""
+        return self.record["covariance"][0]
 
 
 class PnpSolver:
@@ -127,10 +128,7 @@ class PnpSolver:
         self._attitude_weight = 1.0 / math.radians(cfg.attitude_sigma_deg) ** 2
         prior = math.radians(cfg.attitude_prior_sigma_deg)
         self._prior_weight = 1.0 / prior**2 if prior > 0.0 else 0.0
-        lens = (camera.matrix[0, 0], camera.matrix[1, 1], camera.matrix[0, 2], camera.matrix[1, 2])
-        self._terms = np.array([*lens, *camera.distortion, self._prior_weight])
-        self.heading_sigma_rad: float | None = None
-        """Standard deviation of the prior's turn about the station's upright axis, where it is worse than the rest."""
+        self._lens = lens_of(camera)
         self._max_attitude_rad = math.radians(cfg.max_attitude_error_deg)
         self._ambiguous_rad = math.radians(2.0 * cfg.attitude_sigma_deg)
         self._clear_rad = min(self._ambiguous_rad, self._max_attitude_rad)
@@ -140,7 +138,7 @@ class PnpSolver:
         points_m: Array,
         pixels: Array,
         sigma_px: Array,
-        rotation_prior: Array,
+        attitude: Attitude,
         start: PnpSolution | None = None,
     ) -> PnpSolution | None:
         """Pose from n ≥ 3 correspondences, None where no solver finds one in front of the camera.
@@ -149,28 +147,28 @@ class PnpSolver:
             points_m: (n, 3) beacons in the station frame.
             pixels: (n, 2) their images.
             sigma_px: (n,) standard deviation of each image point per axis.
-            rotation_prior: (3, 3) R of the vehicle's own attitude (camera from station axes).
+            attitude: the vehicle's own.
             start: the last frame's solution: refined directly, without the solver chosen by count.
         """
-        return self.solve_lights(light_table(points_m, pixels, sigma_px), rotation_prior, start)
+        return self.solve_lights(light_table(points_m, pixels, sigma_px), attitude, start)
 
     def solve_lights(
-        self, lights: Array, rotation_prior: Array, start: PnpSolution | None = None
+        self, lights: Records[Light], attitude: Attitude, start: PnpSolution | None = None
     ) -> PnpSolution | None:
-        """The same from a table (n, 7) of lights, some of them perhaps predicted: see `light_table`."""
+        """The same from a table (n,) of lights, some of them perhaps predicted."""
         n = len(lights)
         if n < 3:
             return None
         first = None
         if start is not None:
-            first = self._refine(start.numbers, lights, rotation_prior, "tracked")
+            first = self._refine(start.record["pose"], lights, attitude, "tracked")
         elif n >= 5:
-            first = self._sqpnp(lights, rotation_prior)
+            first = self._sqpnp(lights, attitude)
         if first is not None and first.attitude_error_rad <= self._clear_rad:
             return first
         tried = [first]
         if first is None or first.attitude_error_rad > self._ambiguous_rad:
-            tried.append(self._from_prior(lights, rotation_prior))
+            tried.append(self._from_prior(lights, attitude))
         found = [
             solution
             for solution in tried
@@ -178,15 +176,15 @@ class PnpSolver:
         ]
         return min(found, key=self._judge) if found else None
 
-    def plain(self, points_m: Array, pixels: Array, sigma_px: Array, rotation_prior: Array) -> PnpSolution | None:
+    def plain(self, points_m: Array, pixels: Array, sigma_px: Array, attitude: Attitude) -> PnpSolution | None:
         """The standard PnP of the comparison: OpenCV's iterative solver, n ≥ 4 lights of a plane, attitude ignored."""
         xy = self._camera.normalise(pixels)
         start = solve_pnp(points_m, xy, cv2.SOLVEPNP_ITERATIVE, 4)
         if start is None:
             return None
-        return self._refine(_pose(*start), light_table(points_m, pixels, sigma_px), rotation_prior, "plain")
+        return self._refine(_packed(*start), light_table(points_m, pixels, sigma_px), attitude, "plain")
 
-    def mirrored(self, solution: PnpSolution, lights: Array, rotation_prior: Array) -> PnpSolution | None:
+    def mirrored(self, solution: PnpSolution, lights: Records[Light], attitude: Attitude) -> PnpSolution | None:
         """The other pose of a plane (Schweighofer & Pinz 2006), refined from the mirror image of a solution.
 
         Seen from afar, a plane turned by θ about an axis across the line of sight looks like one turned by -θ: R' =
@@ -195,13 +193,13 @@ class PnpSolver:
 
         Args:
             solution: pose of lights that lie more or less in a plane across the station's x axis.
-            lights: (n, 7) their table, see `light_table`.
-            rotation_prior: as in `solve`.
+            lights: (n,) those lights.
+            attitude: as in `solve`.
 
         Returns:
             That pose, which may be the solution itself, or None where there is none.
         """
-        middle = lights[:, :PIXEL].mean(axis=0)
+        middle = lights["place_m"].mean(axis=0)
         centre = solution.rotation @ middle + solution.translation_m
         sight, normal = centre / np.linalg.norm(centre), -solution.rotation[:, 0]
         across = np.asarray(np.cross(normal, sight), dtype=np.float64)
@@ -211,8 +209,8 @@ class PnpSolver:
         angle = 2.0 * math.atan2(sine, float(normal @ sight))
         turn = rotation_of(across * (angle / sine))
         rotation = turn @ solution.rotation
-        start = _pose(vector_of(rotation), centre - rotation @ middle)
-        return self._refine(start, lights, rotation_prior, solution.solver)
+        start = _packed(vector_of(rotation), centre - rotation @ middle)
+        return self._refine(start, lights, attitude, solution.solver)
 
     def project(self, solution: PnpSolution, points_m: Array) -> Array:
         """(k, 2) pixels of station points (k, 3) under a solution."""
@@ -221,35 +219,47 @@ class PnpSolver:
     def _judge(self, solution: PnpSolution) -> float:
         return solution.cost + self._attitude_weight * solution.attitude_error_rad**2
 
-    def _sqpnp(self, lights: Array, prior: Array) -> PnpSolution | None:
-        points, pixels = _parts(lights)
-        xy = self._camera.normalise(pixels)
-        start = solve_pnp(points, xy, cv2.SOLVEPNP_SQPNP, 5)
-        return self._refine(_pose(*start), lights, prior, "sqpnp") if start is not None else None
+    def _sqpnp(self, lights: Records[Light], attitude: Attitude) -> PnpSolution | None:
+        start = solve_pnp(*self._parts(lights), cv2.SOLVEPNP_SQPNP, 5)
+        return self._refine(_packed(*start), lights, attitude, "sqpnp") if start is not None else None
 
-    def _from_prior(self, lights: Array, prior: Array) -> PnpSolution | None:
-        points, pixels = _parts(lights)
-        translation = translation_from_rotation(prior, points, self._camera.normalise(pixels))
+    def _from_prior(self, lights: Records[Light], attitude: Attitude) -> PnpSolution | None:
+        translation = translation_from_rotation(attitude.rotation, *self._parts(lights))
         if translation is None:
             return None
-        return self._refine(_pose(vector_of(prior), translation), lights, prior, "iterative")
+        return self._refine(_packed(vector_of(attitude.rotation), translation), lights, attitude, "iterative")
 
-    def _refine(self, start: Array, lights: Array, prior: Array, solver: str) -> PnpSolution | None:
+    def _parts(self, lights: Records[Light]) -> tuple[Array, Array]:
+        """Places (n, 3) and normalised images (n, 2) of lights, each of its own memory as OpenCV wants them."""
+        return lights["place_m"].copy(), self._camera.normalise(lights["centre_px"].copy())
+
+    def _refine(
+        self, start: Records[Pose], lights: Records[Light], attitude: Attitude, solver: str
+    ) -> PnpSolution | None:
         """Levenberg–Marquardt on the weighted reprojection error; from the last frame's pose it may stop sooner."""
-        heading_weight = self._prior_weight
-        if self.heading_sigma_rad is not None:
-            heading_weight = min(1.0 / self.heading_sigma_rad**2, heading_weight)
+        tilt_weight = heading_weight = self._prior_weight
+        if attitude.heading_sigma_rad is not None:
+            heading_weight = min(1.0 / attitude.heading_sigma_rad**2, heading_weight)
         decrement = _DECREMENT_TRACKED if solver == "tracked" else _DECREMENT
-        numbers = solve_from(start, lights, prior, self._terms, heading_weight, decrement)
-        cost = numbers.item(COST)
-        return PnpSolution(numbers, numbers.item(ATTITUDE), cost, solver) if cost == cost else None
+        record: Records[Solution] = new_rows(1, dtype=_SOLUTION)
+        solve_from(start, lights, attitude.rotation, self._lens, tilt_weight, heading_weight, decrement, record)
+        cost = record["cost"].item()
+        if cost != cost:
+            return None
+        return PnpSolution(record, len(lights), record["attitude_error_rad"].item(), cost, solver)
 
 
-def light_table(points_m: Array, pixels: Array, sigma_px: Array) -> Array:
-    """(n, 7) table of seen lights: X, Y, Z in the station frame, m; image u, v and its σ (n,), px; 1 for seen."""
-    table = np.ones((len(pixels), SEEN + 1))
-    table[:, :PIXEL], table[:, PIXEL:SIGMA], table[:, SIGMA] = points_m, pixels, sigma_px
+def light_table(points_m: Array, pixels: Array, sigma_px: Array) -> Records[Light]:
+    """(n,) seen lights at places (n, 3) in the station frame, with images (n, 2) and their σ (n,)."""
+    table = Light.zeros(len(pixels))
+    table["place_m"], table["centre_px"], table["sigma_px"], table["is_seen"] = points_m, pixels, sigma_px, True
     return table
+
+
+def lens_of(camera: Camera) -> Array:
+    """(9,) a camera's lens as `numeric.lens` takes it."""
+    matrix = camera.matrix
+    return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *camera.distortion])
 
 
 def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Array | None:
@@ -271,11 +281,5 @@ def translation_from_rotation(rotation: Array, points_m: Array, xy: Array) -> Ar
     return np.array([*(mean_e + mean_xy * depth), depth])
 
 
-def _parts(lights: Array) -> tuple[Array, Array]:
-    """Points (n, 3) and pixels (n, 2) of a table of lights, each of its own memory as OpenCV wants them."""
-    return lights[:, :PIXEL].copy(), lights[:, PIXEL:SIGMA].copy()
-
-
-def _pose(rotation_vector: Array, translation_m: Array) -> Array:
-    """(6,) of a rotation vector and a translation."""
-    return np.concatenate([rotation_vector, translation_m])
+def _packed(rotation_vector: Array, translation_m: Array) -> Records[Pose]:
+    return Pose(rotation_vector, translation_m).packed()

@@ -9,7 +9,8 @@ import numpy as np
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import BLUE
-from auvdock.numeric.tracks import CLASS_ID, DETECTION, window_of
+from auvdock.numeric.records import Records
+from auvdock.numeric.tracks import Track, window_of
 
 __all__ = ["propose", "surest_lights"]
 
@@ -18,22 +19,24 @@ _LEAST_SPREAD = 1e-12
 
 
 @compiled
-def surest_lights(numbers: Array, labels: IntArray, min_occurrences: int, min_confidence: float, most: int) -> IntArray:
+def surest_lights(
+    tracks: Records[Track], scores: Array, min_occurrences: int, min_confidence: float, most: int
+) -> IntArray:
     """Rows (c,) of the blue tracks that are seen now, often and surely enough, surest first, at most `most`.
 
     Args:
-        numbers: (n, 7 + window) of the tracks, as `LightTracker.numbers`.
-        labels: (n, 6) of the tracks, as `LightTracker.labels`.
+        tracks: (n,) tracks.
+        scores: (n, window) their scores in the last frames.
         min_occurrences: least number of detections within the window.
         min_confidence: their least mean score.
         most: only so many.
     """
-    rows, confidence = np.empty(len(labels), dtype=np.int64), np.empty(len(labels))
+    rows, confidence = np.empty(len(tracks), dtype=np.int64), np.empty(len(tracks))
     count = 0
-    for i in range(len(labels)):
-        if labels[i, CLASS_ID] != BLUE or labels[i, DETECTION] < 0:
+    for i in range(len(tracks)):
+        if tracks[i].class_id != BLUE or tracks[i].detection < 0:
             continue
-        occurrences, total = window_of(numbers, i)
+        occurrences, total = window_of(scores[i])
         mean = total / max(occurrences, 1)
         if occurrences < min_occurrences or mean < min_confidence:
             continue
@@ -95,11 +98,11 @@ def propose(
                 if not _translate(xy, a, b, q, low, high, translation):
                     continue
                 reach = tolerance_m / translation[2] + tolerance
-                badness = _find(xy, q, translation, reach, identity, distance)
-                if _found(identity) < min_beacons:
+                badness = _name(xy, q, translation, reach, identity, distance)
+                if _count(identity) < min_beacons:
                     continue
                 _leave_one_each(identity, distance)
-                if _found(identity) < min_beacons:
+                if _count(identity) < min_beacons:
                     continue
                 count = _enter(identity, badness, proposals, badnesses, count)
     return proposals[:count]
@@ -143,7 +146,7 @@ def _translate(xy: Array, a: int, b: int, q: Array, low: int, high: int, transla
 
 
 @compiled
-def _find(xy: Array, q: Array, translation: Array, reach: float, identity: IntArray, distance: Array) -> float:
+def _name(xy: Array, q: Array, translation: Array, reach: float, identity: IntArray, distance: Array) -> float:
     """Put each beacon's nearest candidate, -1 beyond reach, and its distance (k,) in place; the badness."""
     badness = 0.0
     for i in range(len(q)):
@@ -160,7 +163,7 @@ def _find(xy: Array, q: Array, translation: Array, reach: float, identity: IntAr
 
 
 @compiled
-def _found(identity: IntArray) -> int:
+def _count(identity: IntArray) -> int:
     """Number of beacons that have a candidate."""
     count = 0
     for i in range(len(identity)):

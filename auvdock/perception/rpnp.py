@@ -68,7 +68,7 @@ def rpnp(points_m: Array, xy: Array, *, polish: bool = True) -> RpnpPose | None:
     if not polish:
         return poses[0]
     # A mirrored pose of a plane may reproject nearly as well.
-    return min((_polished(points_m, xy, pose) for pose in poses[:2]), key=lambda pose: pose.error)
+    return min((_polish(points_m, xy, pose) for pose in poses[:2]), key=lambda pose: pose.error)
 
 
 def rpnp_poses(points_m: Array, xy: Array) -> list[RpnpPose]:
@@ -198,26 +198,26 @@ def _pose(points: Array, xy: Array, rays: Array, i: int, j: int, ratio: float) -
         return None
     c, s = c / norm, s / norm
     rotation = frame_camera @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]) @ frame_object.T
-    return _aligned(points, xy, rays, rotation, null[2:5] / null[5] - rotation @ (0.5 * (points[i] + points[j])))
+    return _align(points, xy, rays, rotation, null[2:5] / null[5] - rotation @ (0.5 * (points[i] + points[j])))
 
 
-def _aligned(points: Array, xy: Array, rays: Array, rotation: Array, translation: Array) -> RpnpPose | None:
+def _align(points: Array, xy: Array, rays: Array, rotation: Array, translation: Array) -> RpnpPose | None:
     """The rigid motion onto the points along their rays at the depths found (Li et al., the last step).
 
     The points at their distances along the observed rays are aligned with the object by orthogonal Procrustes
     analysis.
     """
-    pose = _judged(points, xy, rotation, translation)
+    pose = _judge(points, xy, rotation, translation)
     camera = points @ rotation.T + translation
     target = np.linalg.norm(camera, axis=1)[:, None] * rays
     middle = target.mean(axis=0)
     u, _, vt = np.linalg.svd((target - middle).T @ (points - points.mean(axis=0)))
     rotation = u @ np.diag([1.0, 1.0, float(np.linalg.det(u @ vt))]) @ vt
-    better = _judged(points, xy, rotation, middle - rotation @ points.mean(axis=0))
+    better = _judge(points, xy, rotation, middle - rotation @ points.mean(axis=0))
     return better if better is not None and (pose is None or better.error < pose.error) else pose
 
 
-def _polished(points: Array, xy: Array, pose: RpnpPose) -> RpnpPose:
+def _polish(points: Array, xy: Array, pose: RpnpPose) -> RpnpPose:
     """Gauss-Newton on the reprojection error, as long as it falls."""
     for _ in range(_POLISH):
         q = points @ pose.rotation.T + pose.translation_m
@@ -232,7 +232,7 @@ def _polished(points: Array, xy: Array, pose: RpnpPose) -> RpnpPose:
         residual = np.concatenate([u - xy[:, 0], v - xy[:, 1]])
         step = -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
         turn = np.asarray(cv2.Rodrigues(step[:3])[0], dtype=np.float64)
-        better = _judged(points, xy, turn @ pose.rotation, pose.translation_m + step[3:])
+        better = _judge(points, xy, turn @ pose.rotation, pose.translation_m + step[3:])
         if better is None or better.error >= pose.error:
             break
         small = better.error > 0.999 * pose.error
@@ -242,7 +242,7 @@ def _polished(points: Array, xy: Array, pose: RpnpPose) -> RpnpPose:
     return pose
 
 
-def _judged(points: Array, xy: Array, rotation: Array, translation: Array) -> RpnpPose | None:
+def _judge(points: Array, xy: Array, rotation: Array, translation: Array) -> RpnpPose | None:
     camera = points @ rotation.T + translation
     if not (np.isfinite(camera).all() and bool((camera[:, 2] > 1e-9).all())):
         return None

@@ -10,12 +10,13 @@ from auvdock.core.arrays import Array, IntArray
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
 from auvdock.core.contracts import BLUE, Detections
+from auvdock.numeric.lights import Light
+from auvdock.numeric.records import Records
 from auvdock.perception.association import Associated, pose_estimate
 from auvdock.perception.authentication import AuthenticationCfg, Authenticator
 from auvdock.perception.credibility import Credibility, CredibilityCfg
-from auvdock.perception.labelled import labelled_lights
-from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
-from auvdock.perception.pnp_refine import SEEN, SIGMA
+from auvdock.perception.labelled import gather_lights
+from auvdock.perception.pnp import Attitude, PnpCfg, PnpSolution, PnpSolver
 from auvdock.perception.tracker import LightTracker
 
 __all__ = ["SpatiotemporalAssociation"]
@@ -87,21 +88,20 @@ class SpatiotemporalAssociation:
         self,
         tracks: LightTracker,
         detections: Detections,
-        rotation_prior: Array,
+        attitude: Attitude,
         velocity_m_s: Array,
-        heading_sigma_rad: float | None = None,
     ) -> Associated:
         """Process one frame; writes `tracks.beacon_id`."""
-        self._solver.heading_sigma_rad = heading_sigma_rad
-        self._heading_known = heading_sigma_rad is None or heading_sigma_rad <= self._attitude_sigma_rad
+        sigma = attitude.heading_sigma_rad
+        self._heading_known = sigma is None or sigma <= self._attitude_sigma_rad
         self._age += 1
-        self._way_m = rotation_prior.T @ velocity_m_s * (self._age / self._rate_hz)
+        self._way_m = attitude.rotation.T @ velocity_m_s * (self._age / self._rate_hz)
         if self._age > _MAX_POSE_AGE:
             self._last = self._believed = None
             self._noise = 1.0
-        result = self._solve_labelled(tracks, detections, rotation_prior)
-        if result is None and self._authenticate(tracks, rotation_prior):
-            result = self._solve_labelled(tracks, detections, rotation_prior)
+        result = self._solve_labelled(tracks, detections, attitude)
+        if result is None and self._authenticate(tracks, attitude):
+            result = self._solve_labelled(tracks, detections, attitude)
         if result is None:
             return Associated()
         if result.solution is not None and result.array_count >= _MIN_LIT:
@@ -111,11 +111,10 @@ class SpatiotemporalAssociation:
                 self._reacquire(tracks, result.solution)
         return result
 
-    def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Array) -> Associated | None:
+    def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Attitude) -> Associated | None:
         """Pose from the tracks that carry an identity; clears all identities and returns None if it does not hold."""
-        lights, owners, seen = labelled_lights(
-            tracks.numbers,
-            tracks.labels,
+        lights, owners, seen = gather_lights(
+            tracks.table,
             detections.centre_px,
             detections.xyxy,
             self._size_px,
@@ -132,7 +131,7 @@ class SpatiotemporalAssociation:
             return None
         solution = self._solved(lights, seen, prior)
         if seen == _MIN_LIT < count and (solution is None or solution.cost > self._credibility.expected_cost(count)):
-            there = lights[:, SEEN] > 0.0
+            there = lights["is_seen"]
             alone = self._solved(lights[there], seen, prior)
             if alone is not None and self._is_believed(alone):
                 solution, lights, owners = alone, lights[there], owners[there]
@@ -140,11 +139,12 @@ class SpatiotemporalAssociation:
         if seen >= 5 and not believed:
             better, worst = self._without_worst(lights, prior)
             if better is not None:
-                tracks.beacon_id[owners[worst, 0]] = -1
-                lights, owners = np.delete(lights, worst, axis=0), np.delete(owners, worst, axis=0)
+                tracks.beacon_id[owners["track"][worst]] = -1
+                rest = np.arange(len(lights)) != worst
+                lights, owners = lights[rest], owners[rest]
                 solution, seen, believed = better, len(owners), True
         if solution is not None and seen >= _MIN_LIT:
-            self._noise = self._credibility.noise_after(self._noise, solution, lights[:, SIGMA])
+            self._noise = self._credibility.noise_after(self._noise, solution)
         if not believed:
             self._doubted += 1
             if solution is not None and self._doubted <= _MAX_DOUBTED:
@@ -158,10 +158,10 @@ class SpatiotemporalAssociation:
             if not is_alone:
                 self._last, self._believed, self._age = solution, None, 0
                 return Associated()
-        ids = tuple(owners[:, 1].tolist())
+        ids = tuple(owners["beacon"].tolist())
         return Associated(pose_estimate(solution, ids, seen >= _MIN_LIT), seen, solution)
 
-    def _solved(self, lights: Array, seen: int, prior: Array) -> PnpSolution | None:
+    def _solved(self, lights: Records[Light], seen: int, prior: Attitude) -> PnpSolution | None:
         """The pose of the given lights if those of them that were seen reproject well."""
         solution = self._solver.solve_lights(lights, prior, self._last)
         if solution is None or (seen and solution.error_px > self._pnp.max_reprojection_px):
@@ -177,37 +177,37 @@ class SpatiotemporalAssociation:
         before, elapsed_s = self._believed, self._age / self._rate_hz
         return before is None or self._credibility.follows(solution, before, self._way_m, elapsed_s)
 
-    def _likelier(self, solution: PnpSolution, lights: Array, prior: Array) -> tuple[PnpSolution, bool]:
+    def _likelier(self, solution: PnpSolution, lights: Records[Light], prior: Attitude) -> tuple[PnpSolution, bool]:
         """The likelier of a pose and the other one of its plane, and whether it is so by far."""
         other = self._solver.mirrored(solution, lights, prior)
         if other is not None and other.cost < solution.cost:
             solution, other = other, solution
         return solution, self._credibility.is_alone(solution, other)
 
-    def _without_worst(self, lights: Array, prior: Array) -> tuple[PnpSolution | None, int]:
+    def _without_worst(self, lights: Records[Light], prior: Attitude) -> tuple[PnpSolution | None, int]:
         """Leave one of the seen lights out: a single stray light must not cost the identities of all."""
         best: PnpSolution | None = None
-        left_out = 0
+        left_out, every = 0, np.arange(len(lights))
         for index in range(len(lights)):
-            solution = self._solved(np.delete(lights, index, axis=0), len(lights) - 1, prior)
+            solution = self._solved(lights[every != index], len(lights) - 1, prior)
             if solution is None or not self._is_believed(solution):
                 continue
             if best is None or solution.error_px < best.error_px:
                 best, left_out = solution, index
         return best, left_out
 
-    def _authenticate(self, tracks: LightTracker, prior: Array) -> bool:
+    def _authenticate(self, tracks: LightTracker, prior: Attitude) -> bool:
         """Name the beacons among the unnamed; True if a proposal holds."""
         if len(tracks) < self._cfg.min_beacons:
             return False
         chosen = self._authenticator.candidates(tracks)
         if len(chosen) < self._cfg.min_beacons:
             return False
-        pixels = tracks.state[chosen, :2]
+        pixels = tracks.centre_px[chosen]
         blue = np.flatnonzero(tracks.class_id == BLUE)
-        others = tracks.state[np.setdiff1d(blue, chosen), :2]
+        others = tracks.centre_px[np.setdiff1d(blue, chosen)]
         self._last = None
-        for identity in self._authenticator.propose(self._camera.normalise(pixels), prior):
+        for identity in self._authenticator.propose(self._camera.normalise(pixels), prior.rotation):
             settled = self._settle(pixels, identity, prior, others)
             if settled is not None:
                 identity, self._last = settled
@@ -219,7 +219,7 @@ class SpatiotemporalAssociation:
         return False
 
     def _settle(
-        self, pixels: Array, identity: IntArray, prior: Array, others_px: Array
+        self, pixels: Array, identity: IntArray, prior: Attitude, others_px: Array
     ) -> tuple[IntArray, PnpSolution] | None:
         """Solve, look again where all beacons must be, and solve again; None if the identities do not hold.
 
@@ -239,17 +239,19 @@ class SpatiotemporalAssociation:
                 return None
             again = self._match(solution, pixels)
             if np.array_equal(again, identity):
-                return (identity, solution) if self._likely(solution, identity, pixels, others_px) else None
+                return (identity, solution) if self._likely(solution, identity, prior, pixels, others_px) else None
             identity = again
         return None
 
-    def _likely(self, solution: PnpSolution, identity: IntArray, pixels: Array, others_px: Array) -> bool:
+    def _likely(
+        self, solution: PnpSolution, identity: IntArray, prior: Attitude, pixels: Array, others_px: Array
+    ) -> bool:
         """Whether new identities hold: a good fit, and far likelier than spurious lights in those places."""
         if solution.error_px > self._pnp.max_reprojection_px or not self._is_believed(solution):
             return False
         unused = np.setdiff1d(np.arange(len(self._blue_m)), np.flatnonzero(identity >= 0))
         others_px = np.vstack([np.delete(pixels, identity[identity >= 0], axis=0), others_px])
-        odds = self._credibility.log_odds(solution, unused, others_px, self._sigma_px, self._solver.heading_sigma_rad)
+        odds = self._credibility.log_odds(solution, unused, others_px, self._sigma_px, prior.heading_sigma_rad)
         return odds >= self._min_log_odds
 
     def _match(self, solution: PnpSolution, pixels: Array) -> IntArray:
@@ -275,7 +277,7 @@ class SpatiotemporalAssociation:
         ).nonzero()[0]
         if len(fresh) == 0:
             return
-        identity = self._match(solution, tracks.state[fresh, :2])
+        identity = self._match(solution, tracks.centre_px[fresh])
         carried = tracks.beacon_id[tracks.detection >= 0]
         for beacon in np.flatnonzero(identity >= 0):
             if beacon not in carried:

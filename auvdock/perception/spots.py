@@ -30,12 +30,12 @@ _MARGIN_PX = 64
 
 def brightest_channel(image: Image) -> Image:
     """(H, W) maximum over the channels, lightly smoothed against pixel noise (a Gaussian of 0.8 px, 3 × 3)."""
-    return _smoothed(np.ascontiguousarray(image).reshape(len(image), -1), False)
+    return _smooth(np.ascontiguousarray(image).reshape(len(image), -1), False)
 
 
 def mean_channel(image: Image) -> Image:
     """(H, W) mean over the channels, smoothed in the same way."""
-    return _smoothed(np.ascontiguousarray(image).reshape(len(image), -1), True)
+    return _smooth(np.ascontiguousarray(image).reshape(len(image), -1), True)
 
 
 def background(level: Image, size_px: int) -> Image:
@@ -114,7 +114,7 @@ def inside(detections: Detections, regions: Sequence[RegionOfInterest]) -> Detec
 
 
 @compiled
-def _smoothed(image: Image, mean: bool) -> Image:
+def _smooth(image: Image, mean: bool) -> Image:
     """Mean or maximum over the channels of rows (h, 3 w), smoothed; mirrored about the outermost pixels' centres."""
     height, width = image.shape[0], image.shape[1] // 3
     # The Gaussian in 256ths.

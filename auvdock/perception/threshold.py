@@ -131,9 +131,9 @@ class ThresholdDetector:
         too_large = contrast.size + 1
         if len(found) > 2000:
             # A threshold drowned in noise: keep the largest, the rest is no light.
-            found = found[np.argsort(-found[:, 4], kind="stable")[:2000]]
+            found = found[np.argsort(-found["area"], kind="stable")[:2000]]
             too_large = contrast.size / 2
-        return [tuple(row) for row in found.tolist() if self._cfg.min_area_px <= row[4] < too_large]
+        return [box for box in found.tolist() if self._cfg.min_area_px <= box[4] < too_large]
 
     def _split(
         self, patch: Image, floor: float, x: int, y: int, prominence: float, spots: list[_Spot], depth: int = 0
@@ -146,12 +146,12 @@ class ThresholdDetector:
                 if peak - level <= prominence:
                     break
                 parts = [
-                    part
-                    for part in self._components(patch, level)
-                    if float(patch[part[1] : part[1] + part[3], part[0] : part[0] + part[2]].max()) > level + prominence
+                    (px, py, w, h)
+                    for px, py, w, h, _ in self._components(patch, level)
+                    if float(patch[py : py + h, px : px + w].max()) > level + prominence
                 ]
                 if len(parts) > 1:
-                    for px, py, w, h, _ in parts:
+                    for px, py, w, h in parts:
                         self._split(
                             patch[py : py + h, px : px + w], level, x + px, y + py, prominence, spots, depth + 1
                         )

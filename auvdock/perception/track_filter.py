@@ -1,80 +1,70 @@
 """One frame of all tracks in one compiled call: predict, pair, correct, count, end and start; loops of the tracker.
 
-A track is a row of two tables, its numbers and its labels (`numeric.tracks`). The tables have room for more rows than
-there are tracks, so tracks end and start in place. The filter's settings come as one array, `filter_terms`: Numba takes
-that at the price of a single number.
+A track is a row of two tables, `Track` and its scores in the last frames. The tables have room for more rows than there
+are tracks, so tracks end and start in place.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
-from auvdock.numeric.tracks import (
-    BEACON_ID,
-    CLASS_ID,
-    COVARIANCE,
-    DETECTION,
-    HISTORY,
-    HITS,
-    LABELS,
-    MISSED,
-    TRACK_ID,
-)
+from auvdock.numeric.records import Record, Records
+from auvdock.numeric.tracks import Track
 
-__all__ = ["advance", "distances", "filter_terms", "settle"]
-
-_DT, _POWER, _GATE, _PIXEL, _SPEED, _LEFT, _TOP, _RIGHT, _BOTTOM, _CONFIRM, _LASTING, _TENTATIVE = range(12)
+__all__ = ["TrackLaw", "advance", "distances", "settle"]
 
 
-def filter_terms(
-    dt_s: float,
-    acceleration_px_s2: float,
-    gate_sigmas: float,
-    pixel_sigma_px: float,
-    initial_speed_px_s: float,
-    border_px: tuple[float, float, float, float],
-    limits: tuple[int, int, int],
-) -> Array:
-    """(12,) the filter's settings.
+@dataclass(frozen=True)
+class TrackLaw(Record):
+    """The filter's settings, squared where the filter takes squares."""
 
-    Args:
-        dt_s: time of a frame.
-        acceleration_px_s2: σ_a.
-        gate_sigmas: gate on a detection's distance.
-        pixel_sigma_px: σ of a detection at full confidence.
-        initial_speed_px_s: σ of a new track's velocity.
-        border_px: left, top, right, bottom beyond which a track ends.
-        limits: a track of the first number of detections or more outlives the second number of frames without one,
-            others the third.
-    """
-    squares = acceleration_px_s2**2, gate_sigmas**2, pixel_sigma_px**2, initial_speed_px_s**2
-    return np.array([dt_s, *squares, *border_px, *limits])
+    dt_s: float
+    """Time of a frame."""
+    acceleration2_px2_s4: float
+    """σ_a²."""
+    gate2: float
+    """Greatest d² / S of a detection."""
+    centre_variance_px2: float
+    """σ² of a detection at full confidence."""
+    speed_variance_px2_s2: float
+    """Of a new track's unknown velocity, per axis."""
+    left_px: float
+    """A track ends left of this, above `top_px`, right of `right_px` or below `bottom_px`."""
+    top_px: float
+    right_px: float
+    bottom_px: float
+    confirm_hits: int
+    """A track of so many detections outlives `max_predicted_frames` without one, others `max_tentative_frames`."""
+    max_predicted_frames: int
+    max_tentative_frames: int
 
 
 @compiled
 def advance(
-    numbers: Array,
-    labels: IntArray,
+    tracks: Records[Track],
+    scores: Array,
     count: int,
     centre: Array,
     score: Array,
     class_id: IntArray,
-    terms: Array,
+    law: Records[TrackLaw],
     slot: int,
     next_id: int,
 ) -> tuple[int, int]:
     """Advance all tracks by one frame, in place.
 
     Args:
-        numbers: (most, 7 + window) table with room for `count` tracks and as many as there are detections.
-        labels: (most, 6) table.
+        tracks: (most,) table with room for `count` tracks and as many as there are detections.
+        scores: (most, window) scores of the tracks' detections in the last frames, 0 for none.
         count: tracks so far.
         centre: (m, 2) detections, px.
         score: (m,) their confidence.
         class_id: (m,) their class.
-        terms: `filter_terms`.
+        law: the settings.
         slot: this frame's place in the window.
         next_id: of the next new track.
 
@@ -82,21 +72,21 @@ def advance(
         The tracks after this frame and the next id. The first is -1 where detections compete: then the tracks are only
         predicted, `distances` tells what may be paired, and `settle` does the rest.
     """
-    _predict(numbers, count, terms)
-    if not _pair(numbers, labels, count, centre, score, class_id, terms):
+    _predict(tracks[:count], law[0])
+    if not _pair(tracks[:count], centre, score, class_id, law[0]):
         return -1, next_id
-    return settle(numbers, labels, count, centre, score, class_id, terms, slot, next_id)
+    return settle(tracks, scores, count, centre, score, class_id, law, slot, next_id)
 
 
 @compiled
 def settle(
-    numbers: Array,
-    labels: IntArray,
+    tracks: Records[Track],
+    scores: Array,
     count: int,
     centre: Array,
     score: Array,
     class_id: IntArray,
-    terms: Array,
+    law: Records[TrackLaw],
     slot: int,
     next_id: int,
 ) -> tuple[int, int]:
@@ -105,128 +95,123 @@ def settle(
     A track goes on if it was not missed for longer than allowed and does not lie far outside the image. A detection
     that no such track holds starts a new one.
     """
-    taken = np.zeros(len(score), dtype=np.bool_)
+    held = np.zeros(len(score), dtype=np.bool_)
     kept = 0
     for i in range(count):
-        j = labels[i, DETECTION]
+        j = tracks[i].detection
         if j >= 0:
-            _correct(numbers, i, centre, j, _variance(score, j, terms))
-            labels[i, MISSED] = 0
-            labels[i, HITS] += 1
-            numbers[i, HISTORY + slot] = score[j]
+            _correct(tracks[i], centre[j], _variance(score[j], law[0]))
         else:
-            labels[i, MISSED] += 1
-            numbers[i, HISTORY + slot] = 0.0
-        u, v = numbers[i, 0], numbers[i, 1]
-        most = terms[_LASTING] if labels[i, HITS] >= terms[_CONFIRM] else terms[_TENTATIVE]
-        inside = terms[_LEFT] < u < terms[_RIGHT] and terms[_TOP] < v < terms[_BOTTOM]
-        if labels[i, MISSED] > most or not inside:
+            tracks[i].missed += 1
+        scores[i, slot] = score[j] if j >= 0 else 0.0
+        if not _goes_on(tracks[i], law[0]):
             continue
         if j >= 0:
-            taken[j] = True
+            held[j] = True
         if kept < i:
-            for k in range(numbers.shape[1]):
-                numbers[kept, k] = numbers[i, k]
-            for k in range(LABELS):
-                labels[kept, k] = labels[i, k]
+            tracks[kept] = tracks[i]
+            scores[kept] = scores[i]
         kept += 1
     for j in range(len(score)):
-        if taken[j]:
-            continue
-        for k in range(numbers.shape[1]):
-            numbers[kept, k] = 0.0
-        numbers[kept, 0], numbers[kept, 1] = centre[j, 0], centre[j, 1]
-        numbers[kept, COVARIANCE], numbers[kept, COVARIANCE + 2] = _variance(score, j, terms), terms[_SPEED]
-        numbers[kept, HISTORY + slot] = score[j]
-        labels[kept, TRACK_ID], labels[kept, CLASS_ID], labels[kept, BEACON_ID] = next_id, class_id[j], -1
-        labels[kept, MISSED], labels[kept, HITS], labels[kept, DETECTION] = 0, 1, j
-        next_id += 1
-        kept += 1
+        if not held[j]:
+            _start(tracks[kept], centre[j], _variance(score[j], law[0]), law[0])
+            tracks[kept].track_id, tracks[kept].class_id, tracks[kept].detection = next_id, class_id[j], j
+            scores[kept] = 0.0
+            scores[kept, slot] = score[j]
+            next_id += 1
+            kept += 1
     return kept, next_id
 
 
 @compiled
-def distances(
-    numbers: Array, labels: IntArray, count: int, centre: Array, score: Array, class_id: IntArray, terms: Array
-) -> Array:
+def distances(tracks: Records[Track], centre: Array, score: Array, class_id: IntArray, law: Records[TrackLaw]) -> Array:
     """(n, m) d² / S of predicted tracks and detections; `inf` beyond the gate and between classes."""
-    distance = np.empty((count, len(score)))
+    distance = np.empty((len(tracks), len(score)))
     for j in range(len(score)):
-        variance = _variance(score, j, terms)
-        for i in range(count):
-            distance[i, j] = _distance(numbers, labels, i, centre, class_id, j, variance, terms)
+        variance = _variance(score[j], law[0])
+        for i in range(len(tracks)):
+            distance[i, j] = _distance(tracks[i], centre[j], class_id[j], variance, law[0])
     return distance
 
 
 @compiled
-def _variance(score: Array, j: int, terms: Array) -> float:
-    """R = σ² / (score + 0.1) of detection j."""
-    return terms[_PIXEL] / (score[j] + 0.1)
+def _variance(score: float, law: TrackLaw) -> float:
+    """R = σ² / (score + 0.1) of a detection."""
+    return law.centre_variance_px2 / (score + 0.1)
 
 
 @compiled
-def _predict(numbers: Array, count: int, terms: Array) -> None:
+def _predict(tracks: Records[Track], law: TrackLaw) -> None:
     """F x and F P Fᵀ + Q of all tracks, in place."""
-    dt, power = terms[_DT], terms[_POWER]
-    for i in range(count):
+    dt, power = law.dt_s, law.acceleration2_px2_s4
+    for i in range(len(tracks)):
+        track = tracks[i]
         for axis in range(2):
-            numbers[i, axis] += dt * numbers[i, 2 + axis]
-        p01, p11 = numbers[i, COVARIANCE + 1], numbers[i, COVARIANCE + 2]
-        numbers[i, COVARIANCE] += dt * (2.0 * p01 + dt * p11) + 0.25 * dt**4 * power
-        numbers[i, COVARIANCE + 1] += dt * p11 + 0.5 * dt**3 * power
-        numbers[i, COVARIANCE + 2] += dt**2 * power
+            track.centre_px[axis] += dt * track.velocity_px_s[axis]
+        p01, p11 = track.p01_px2_s, track.p11_px2_s2
+        track.p00_px2 += dt * (2.0 * p01 + dt * p11) + 0.25 * dt**4 * power
+        track.p01_px2_s += dt * p11 + 0.5 * dt**3 * power
+        track.p11_px2_s2 += dt**2 * power
 
 
 @compiled
-def _distance(
-    numbers: Array,
-    labels: IntArray,
-    i: int,
-    centre: Array,
-    class_id: IntArray,
-    j: int,
-    variance: float,
-    terms: Array,
-) -> float:
-    """d² / S of track i and detection j, `inf` where they cannot be the same light."""
-    if labels[i, CLASS_ID] != class_id[j]:
+def _distance(track: Track, centre: Array, class_id: int, variance: float, law: TrackLaw) -> float:
+    """d² / S of a track and a detection, `inf` where they cannot be the same light."""
+    if track.class_id != class_id:
         return np.inf
-    x, y = numbers[i, 0] - centre[j, 0], numbers[i, 1] - centre[j, 1]
-    value = (x * x + y * y) / (numbers[i, COVARIANCE] + variance)
-    return value if value <= terms[_GATE] else np.inf
+    x, y = track.centre_px[0] - centre[0], track.centre_px[1] - centre[1]
+    value = (x * x + y * y) / (track.p00_px2 + variance)
+    return value if value <= law.gate2 else np.inf
 
 
 @compiled
-def _pair(
-    numbers: Array, labels: IntArray, count: int, centre: Array, score: Array, class_id: IntArray, terms: Array
-) -> bool:
-    """Label each track with its detection, -1 for none; False where several compete for one.
+def _pair(tracks: Records[Track], centre: Array, score: Array, class_id: IntArray, law: TrackLaw) -> bool:
+    """Give each track its detection, -1 for none; False where several compete for one.
 
     Where nobody competes the Hungarian method would find the same.
     """
-    for i in range(count):
-        labels[i, DETECTION] = -1
+    for i in range(len(tracks)):
+        tracks[i].detection = -1
     for j in range(len(score)):
-        variance = _variance(score, j, terms)
-        taken = False
-        for i in range(count):
-            if _distance(numbers, labels, i, centre, class_id, j, variance, terms) == np.inf:
+        variance = _variance(score[j], law)
+        held = False
+        for i in range(len(tracks)):
+            if _distance(tracks[i], centre[j], class_id[j], variance, law) == np.inf:
                 continue
-            if taken or labels[i, DETECTION] >= 0:
+            if held or tracks[i].detection >= 0:
                 return False
-            labels[i, DETECTION], taken = j, True
+            tracks[i].detection, held = j, True
     return True
 
 
 @compiled
-def _correct(numbers: Array, i: int, centre: Array, j: int, variance: float) -> None:
-    """Kalman correction of track i by detection j, in place."""
-    p00, p01 = numbers[i, COVARIANCE], numbers[i, COVARIANCE + 1]
+def _correct(track: Track, centre: Array, variance: float) -> None:
+    """Kalman correction of a track by its detection, in place."""
+    p00, p01 = track.p00_px2, track.p01_px2_s
     gain_0, gain_1 = p00 / (p00 + variance), p01 / (p00 + variance)
     for axis in range(2):
-        innovation = centre[j, axis] - numbers[i, axis]
-        numbers[i, axis] += gain_0 * innovation
-        numbers[i, 2 + axis] += gain_1 * innovation
-    numbers[i, COVARIANCE + 2] -= gain_1 * p01
-    numbers[i, COVARIANCE + 1] *= 1.0 - gain_0
-    numbers[i, COVARIANCE] *= 1.0 - gain_0
+        innovation = centre[axis] - track.centre_px[axis]
+        track.centre_px[axis] += gain_0 * innovation
+        track.velocity_px_s[axis] += gain_1 * innovation
+    track.p11_px2_s2 -= gain_1 * p01
+    track.p01_px2_s *= 1.0 - gain_0
+    track.p00_px2 *= 1.0 - gain_0
+    track.missed = 0
+    track.hits += 1
+
+
+@compiled
+def _goes_on(track: Track, law: TrackLaw) -> bool:
+    """Whether a track was not missed for longer than allowed and does not lie far outside the image."""
+    u, v = track.centre_px[0], track.centre_px[1]
+    most = law.max_predicted_frames if track.hits >= law.confirm_hits else law.max_tentative_frames
+    return track.missed <= most and law.left_px < u < law.right_px and law.top_px < v < law.bottom_px
+
+
+@compiled
+def _start(track: Track, centre: Array, variance: float, law: TrackLaw) -> None:
+    """Make a row the new track of a detection."""
+    for axis in range(2):
+        track.centre_px[axis], track.velocity_px_s[axis] = centre[axis], 0.0
+    track.p00_px2, track.p01_px2_s, track.p11_px2_s2 = variance, 0.0, law.speed_variance_px2_s2
+    track.beacon_id, track.missed, track.hits = -1, 0, 1

@@ -7,7 +7,7 @@ covariance, so a track's 4 × 4 covariance is three numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -16,8 +16,9 @@ from auvdock.core.arrays import Array, IntArray
 from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections
 from auvdock.core.limits import Count, Positive, at_least, between
-from auvdock.numeric.tracks import COVARIANCE, DETECTION, HISTORY, LABELS, STATE
-from auvdock.perception.track_filter import advance, distances, filter_terms, settle
+from auvdock.numeric.records import Records
+from auvdock.numeric.tracks import Track
+from auvdock.perception.track_filter import TrackLaw, advance, distances, settle
 from auvdock.perception.views import TrackViews
 
 __all__ = ["LightTracker", "TrackerCfg"]
@@ -27,8 +28,6 @@ _ROOM = 32
 """Tracks that there is room for at first."""
 _MARGIN = 0.1
 """Share of the image by which a track may lie outside it."""
-_LABEL_VIEWS = ("track_id", "class_id", "beacon_id", "missed", "hits", "detection")
-_VIEWS = ("numbers", "labels", "state", "covariance", "history", *_LABEL_VIEWS)
 
 
 @dataclass(frozen=True)
@@ -60,115 +59,121 @@ class LightTracker:
     H = [1, 0], R = σ² / (score + 0.1). Detections are assigned to predictions of their own class by the Hungarian
     method at cost d²/S + 2 ln(S/R), gated at d² / S ≤ gate².
 
-    All arrays are views of two tables that the next frame goes on in.
-
-    Attributes:
-        numbers: (n, 7 + window) state, covariance and history side by side.
-        labels: (n, 6) track id, class, beacon, missed, hits and detection side by side.
-        state: (n, 4) u, v in px and u̇, v̇ in px/s.
-        covariance: (n, 3) per-axis P₀₀ in px², P₀₁ in px²/s, P₁₁ in px²/s².
-        track_id: (n,) unique since the last reset.
-        class_id: (n,) class of the light.
-        missed: (n,) consecutive frames without a detection.
-        hits: (n,) detections so far.
-        beacon_id: (n,) authenticated beacon, -1 for none; the association writes it.
-        detection: (n,) index of this frame's detection, -1 for none.
-        history: (n, window) scores in the last frames in no particular order, 0 where there was no detection.
+    All arrays that it shows are views of two tables that the next frame goes on in.
     """
 
     def __init__(self, cfg: TrackerCfg, rate_hz: float, width_px: int, height_px: int) -> None:
         """Precompute the filter's constants for a camera's rate and size."""
         self._cfg = cfg
-        self._terms = filter_terms(
-            1.0 / rate_hz,
-            cfg.acceleration_px_s2,
-            cfg.gate_sigmas,
-            cfg.pixel_sigma_px,
-            cfg.initial_speed_px_s,
-            (-_MARGIN * width_px, -_MARGIN * height_px, (1.0 + _MARGIN) * width_px, (1.0 + _MARGIN) * height_px),
-            (cfg.confirm_hits, cfg.max_predicted_frames, cfg.max_tentative_frames),
-        )
+        self._law = TrackLaw(
+            dt_s=1.0 / rate_hz,
+            acceleration2_px2_s4=cfg.acceleration_px_s2**2,
+            gate2=cfg.gate_sigmas**2,
+            centre_variance_px2=cfg.pixel_sigma_px**2,
+            speed_variance_px2_s2=cfg.initial_speed_px_s**2,
+            left_px=-_MARGIN * width_px,
+            top_px=-_MARGIN * height_px,
+            right_px=(1.0 + _MARGIN) * width_px,
+            bottom_px=(1.0 + _MARGIN) * height_px,
+            confirm_hits=cfg.confirm_hits,
+            max_predicted_frames=cfg.max_predicted_frames,
+            max_tentative_frames=cfg.max_tentative_frames,
+        ).packed()
         self.reset()
 
     def reset(self) -> None:
         """Forget all tracks."""
-        self._all_numbers = np.zeros((_ROOM, HISTORY + self._cfg.window_frames))
-        self._all_labels = np.zeros((_ROOM, LABELS), dtype=np.int64)
-        self._bind(0)
+        self._table = Track.zeros(_ROOM)
+        self._scores = np.zeros((_ROOM, self._cfg.window_frames))
+        self._count = 0
         self._next_id = 0
         self._slot = 0
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the views: a copy of a view no longer follows its table."""
-        return {name: value for name, value in self.__dict__.items() if name not in _VIEWS}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take the views anew, of the copied tables."""
-        self.__dict__.update(state)
-        self._bind(self._count)
 
     def __len__(self) -> int:
         """Number of tracks alive."""
         return self._count
 
+    @property
+    def table(self) -> Records[Track]:
+        """(n,) all that is known of the tracks but their scores."""
+        return self._table[: self._count]
+
+    @property
+    def scores(self) -> Array:
+        """(n, window) scores in the last frames in no particular order, 0 where there was no detection."""
+        return self._scores[: self._count]
+
+    @property
+    def centre_px(self) -> Array:
+        """(n, 2) u, v."""
+        return self.table["centre_px"]
+
+    @property
+    def track_id(self) -> IntArray:
+        """(n,) unique since the last reset."""
+        return self.table["track_id"]
+
+    @property
+    def class_id(self) -> IntArray:
+        """(n,) class of the light."""
+        return self.table["class_id"]
+
+    @property
+    def beacon_id(self) -> IntArray:
+        """(n,) authenticated beacon, -1 for none; the association writes it."""
+        return self.table["beacon_id"]
+
+    @property
+    def missed(self) -> IntArray:
+        """(n,) consecutive frames without a detection."""
+        return self.table["missed"]
+
+    @property
+    def hits(self) -> IntArray:
+        """(n,) detections so far."""
+        return self.table["hits"]
+
+    @property
+    def detection(self) -> IntArray:
+        """(n,) index of this frame's detection, -1 for none."""
+        return self.table["detection"]
+
     def update(self, detections: Detections) -> None:
         """Advance one frame: predict, assign, correct, start new tracks, end old ones."""
         self._slot = (self._slot + 1) % self._cfg.window_frames
         centre, score, class_id = detections.centre_px, detections.score, detections.class_id
-        before, terms = self._count, self._terms
-        if before + len(score) > len(self._all_labels):
+        before, law = self._count, self._law
+        if before + len(score) > len(self._table):
             self._make_room(before + len(score))
-        numbers, labels = self._all_numbers, self._all_labels
-        count, next_id = advance(numbers, labels, before, centre, score, class_id, terms, self._slot, self._next_id)
+        table, scores = self._table, self._scores
+        count, next_id = advance(table, scores, before, centre, score, class_id, law, self._slot, self._next_id)
         if count < 0:
-            self._assign(distances(numbers, labels, before, centre, score, class_id, terms), score)
-            count, next_id = settle(numbers, labels, before, centre, score, class_id, terms, self._slot, self._next_id)
-        self._next_id = next_id
-        if count != before:
-            self._bind(count)
-
-    def position_sigma_px(self) -> Array:
-        """(n,) standard deviation of each track's position, per axis."""
-        return np.sqrt(self.covariance[:, 0])
-
-    def occurrences(self) -> IntArray:
-        """(n,) detections within the window."""
-        return np.count_nonzero(self.history, axis=1)
+            self._assign(distances(self.table, centre, score, class_id, law), score)
+            count, next_id = settle(table, scores, before, centre, score, class_id, law, self._slot, self._next_id)
+        self._count, self._next_id = count, next_id
 
     def mean_confidence(self) -> Array:
         """(n,) mean score of the detections within the window, 0 where there is none."""
-        return self.history.sum(axis=1) / np.maximum(self.occurrences(), 1)
+        return self.scores.sum(axis=1) / np.maximum(np.count_nonzero(self.scores, axis=1), 1)
 
     def views(self) -> TrackViews:
         """The tracks as they are now, for recordings."""
-        return TrackViews(self.numbers, self.labels)
-
-    def _bind(self, count: int) -> None:
-        self._count = count
-        self.numbers: Array = self._all_numbers[:count]
-        self.labels: IntArray = self._all_labels[:count]
-        self.state: Array = self.numbers[:, STATE:COVARIANCE]
-        self.covariance: Array = self.numbers[:, COVARIANCE:HISTORY]
-        self.history: Array = self.numbers[:, HISTORY:]
-        self.track_id, self.class_id, self.beacon_id, self.missed, self.hits, self.detection = self.labels.T
+        return TrackViews(self.table)
 
     def _make_room(self, least: int) -> None:
         """For as many tracks and more."""
-        numbers, labels = self.numbers, self.labels
-        self._all_numbers = np.zeros((2 * least, numbers.shape[1]))
-        self._all_labels = np.zeros((2 * least, LABELS), dtype=np.int64)
-        self._all_numbers[: self._count], self._all_labels[: self._count] = numbers, labels
-        self._bind(self._count)
+        table, scores = Track.zeros(2 * least), np.zeros((2 * least, self._cfg.window_frames))
+        table[: self._count], scores[: self._count] = self.table, self.scores
+        self._table, self._scores = table, scores
 
     def _assign(self, distance: Array, score: Array) -> None:
         """The Hungarian method, where several could be paired."""
         variance = self._cfg.pixel_sigma_px**2 / (score + 0.1)
         allowed = np.isfinite(distance)
-        spread = self.covariance[:, :1] + variance
+        spread = self.table["p00_px2"][:, None] + variance
         # A stale track has a wide gate: the log term keeps it from taking the detection of a sharp one.
         cost = np.where(allowed, distance + 2.0 * np.log(spread / variance), _UNMATCHED_COST)
         rows, columns = linear_sum_assignment(cost)
         kept = allowed[rows, columns]
-        matched = self.labels[:, DETECTION]
-        matched.fill(-1)
-        matched[rows[kept]] = columns[kept]
+        self.detection.fill(-1)
+        self.detection[rows[kept]] = columns[kept]

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import overload
 
-from auvdock.core.arrays import Array, IntArray
+import numpy as np
+
 from auvdock.core.contracts import TrackView
+from auvdock.numeric.records import Records
+from auvdock.numeric.tracks import Track
 
 __all__ = ["TrackViews"]
 
@@ -14,22 +17,16 @@ __all__ = ["TrackViews"]
 class TrackViews(Sequence[TrackView]):
     """The tracks of one frame; holds copies, so it stays what it was when the tracker goes on."""
 
-    __slots__ = ("_centre_px", "_labels", "_made")
+    __slots__ = ("_made", "_rows")
 
-    def __init__(self, centre_px: Array, labels: IntArray) -> None:
-        """Copy what the views will show.
-
-        Args:
-            centre_px: (n, 2 or more) positions in the first columns.
-            labels: (n, 4 or more) track id, class id, beacon id (-1 for none), frames missed in the first columns.
-        """
-        self._centre_px = centre_px.copy()
-        self._labels = labels.copy()
+    def __init__(self, tracks: Records[Track]) -> None:
+        """Copy the tracks (n,), byte by byte: NumPy takes a hundred times as long to copy records."""
+        self._rows = tracks.tobytes()
         self._made: tuple[TrackView, ...] | None = None
 
     def __len__(self) -> int:
         """Number of tracks."""
-        return len(self._labels)
+        return len(self._rows) // Track.dtype().itemsize
 
     def __iter__(self) -> Iterator[TrackView]:
         """In the tracker's order."""
@@ -47,9 +44,11 @@ class TrackViews(Sequence[TrackView]):
 
     def _views(self) -> tuple[TrackView, ...]:
         if self._made is None:
-            rows = zip(self._labels[:, :4].tolist(), self._centre_px[:, :2], strict=True)
+            rows = np.frombuffer(self._rows, dtype=Track.dtype())
+            names = ("track_id", "class_id", "beacon_id", "missed")
+            columns = zip(rows["centre_px"].copy(), *(rows[name].tolist() for name in names), strict=True)
             self._made = tuple(
                 TrackView(track_id, centre, class_id, beacon_id if beacon_id >= 0 else None, missed)
-                for (track_id, class_id, beacon_id, missed), centre in rows
+                for centre, track_id, class_id, beacon_id, missed in columns
             )
         return self._made

@@ -18,13 +18,13 @@ from hypothesis import strategies as st
 import auvdock
 from auvdock.assets import asset, asset_names
 from auvdock.campaign.axes import AxisCfg
-from auvdock.campaign.config import STATIONS
 from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 from auvdock.core.magnitudes import unit_of
 from auvdock.core.reader import hints_of
 from auvdock.core.strict import load_toml
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.episode.stations import STATIONS
 from auvdock.optics.detection_model import DetectionModelCfg
 from auvdock.optics.tag_model import TagModelCfg
 from auvdock.optics.water import load_water
@@ -52,7 +52,7 @@ def within(value: Any) -> Iterator[Checked]:
 CLASSES = sorted(set(offspring(Checked)), key=lambda cls: (cls.__module__, cls.__qualname__))
 SAMPLES: dict[type, Checked] = {}
 for whole in (
-    *(make(1) for make in STATIONS.values()),
+    *(kind.level(1) for kind in STATIONS.values()),
     *(load_toml(VehicleCfg, asset("vehicles", name)) for name in asset_names("vehicles")),
     load_toml(DetectionModelCfg, asset("detection", asset_names("detection")[0])),
     load_toml(TagModelCfg, asset("tag_detection", asset_names("tag_detection")[0])),

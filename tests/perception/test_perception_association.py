@@ -27,7 +27,7 @@ from auvdock.perception.authentication import AuthenticationCfg
 from auvdock.perception.credibility import CredibilityCfg
 from auvdock.perception.hungarian_ransac import HungarianRansacCfg
 from auvdock.perception.pipeline import ASSOCIATIONS, AssociationName, BeaconPerception, PerceptionCfg
-from auvdock.perception.pnp import PnpCfg
+from auvdock.perception.pnp import Attitude, PnpCfg
 from auvdock.perception.spatiotemporal import SpatiotemporalAssociation
 from auvdock.perception.tracker import LightTracker, TrackerCfg
 
@@ -183,7 +183,7 @@ def test_swapped_identities_do_not_survive(swap: tuple[int, int]):
     run = Run(7)
     for _ in range(8):
         run.show()
-    tracks = run.perception._tracks
+    tracks = run.perception.tracks
     first, second = (int(np.flatnonzero(tracks.beacon_id == name)[0]) for name in swap)
     tracks.beacon_id[first], tracks.beacon_id[second] = swap[1], swap[0]
     percept = run.show()
@@ -198,7 +198,7 @@ def test_turned_identities_do_not_survive(places: int):
     run = Run(8)
     for _ in range(8):
         run.show()
-    tracks = run.perception._tracks
+    tracks = run.perception.tracks
     tracks.beacon_id[:] = (tracks.beacon_id + places) % 6
     percept = run.show()
     assert percept.pose is not None
@@ -211,9 +211,9 @@ def test_stray_on_a_track_costs_only_its_own_identity():
     for _ in range(8):
         run.show()
     stray = pixels_of(run.motion.at(run.frame / 30.0)[0], RING[1:2])
-    tracks = run.perception._tracks
+    tracks = run.perception.tracks
     row = int(np.flatnonzero(tracks.beacon_id == 1)[0])
-    tracks.state[row, :2] = stray[0] + np.array([15.0, 0.0])
+    tracks.centre_px[row] = stray[0] + np.array([15.0, 0.0])
     percept = run.show(hidden=(1,), extra=stray + np.array([15.0, 0.0]))
     assert percept.pose is not None
     assert percept.pose.measured
@@ -287,7 +287,7 @@ def test_new_identities_start_without_the_doubt_of_the_old():
             moved = detections.centre_px.copy()
             moved[0] += np.array([4.0, 0.0])
             detections = replace(detections, centre_px=moved)
-        found = names.update(tracks, detections, truth.at(0.0)[0][:3, :3].T, np.zeros(3))
+        found = names.update(tracks, detections, Attitude(truth.at(0.0)[0][:3, :3].T), np.zeros(3))
         seen.append(int(np.count_nonzero(tracks.beacon_id >= 0)))
         if frame > 13 and seen[-2] == 0 < seen[-1]:
             assert found.pose is None

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from auvdock.perception.components import components, peaked_components
+from auvdock.perception.components import components, components_and_peaks
 from auvdock.perception.spots import brightest_channel, mean_channel
 
 
@@ -25,12 +25,12 @@ def test_components_are_opencvs(image, threshold):
     _, mask = cv2.threshold(image, threshold, 255, cv2.THRESH_BINARY)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     found = components(image, threshold)
-    assert sorted(found.tolist()) == sorted(stats[1:].tolist())
+    assert sorted(found.tolist()) == sorted(map(tuple, stats[1:].tolist()))
     rng = np.random.default_rng(0)
     taken = np.column_stack([rng.integers(0, image.shape[1], 3), rng.integers(0, image.shape[0], 3)])
-    peaked = peaked_components(image, threshold, taken)
-    assert np.array_equal(peaked[:, :5], found)
-    for _, _, _, _, area, peak, column, row, held in peaked.tolist():
+    again, peaks = components_and_peaks(image, threshold, taken)
+    assert np.array_equal(again, found)
+    for area, (peak, column, row, held) in zip(found["area"], peaks.tolist(), strict=True):
         part = labels == labels[row, column]
         assert area == np.count_nonzero(part)
         assert peak == image[part].max() == image[row, column]
@@ -40,7 +40,7 @@ def test_components_are_opencvs(image, threshold):
 def test_components_come_row_by_row():
     image = np.zeros((6, 9), dtype=np.uint8)
     image[4, 0] = image[2, 7] = image[2, 3] = image[3, 4] = 200
-    assert components(image, 100.0).tolist() == [[3, 2, 2, 2, 2], [7, 2, 1, 1, 1], [0, 4, 1, 1, 1]]
+    assert components(image, 100.0).tolist() == [(3, 2, 2, 2, 2), (7, 2, 1, 1, 1), (0, 4, 1, 1, 1)]
 
 
 def test_a_spiral_is_one_and_parts_of_an_image_are_read():

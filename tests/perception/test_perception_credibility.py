@@ -28,7 +28,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 from auvdock.perception.credibility import Credibility, CredibilityCfg
 from auvdock.perception.pipeline import ASSOCIATIONS, AssociationName, BeaconPerception, PerceptionCfg
-from auvdock.perception.pnp import PnpCfg, PnpSolution, PnpSolver
+from auvdock.perception.pnp import Attitude, PnpCfg, PnpSolution, PnpSolver
 
 RING = LAYOUT.positions_m[ARRAY]
 BLUE_LAMPS = LAYOUT.positions_m[[*ARRAY, FAR]]
@@ -50,7 +50,9 @@ def turned(rng: np.random.Generator, sigma_rad: float) -> Array:
 
 def solved(T_station_camera: Array, prior: Array, noise_px: Array, beacons: IntArray) -> PnpSolution:
     pixels = pixels_of(T_station_camera, RING[beacons]) + noise_px
-    solution = PnpSolver(PnpCfg(), CAMERA).solve(RING[beacons], pixels, np.full(len(beacons), SIGMA_PX), prior)
+    solution = PnpSolver(PnpCfg(), CAMERA).solve(
+        RING[beacons], pixels, np.full(len(beacons), SIGMA_PX), Attitude(prior)
+    )
     assert solution is not None
     return solution
 
@@ -77,7 +79,9 @@ def test_of_right_poses_as_many_are_doubted_as_noise_explains():
 @pytest.mark.parametrize("distance_m", [70.0, 400.0, 4e4])
 def test_a_pose_beyond_the_reach_of_light_is_not_believed(credibility: Credibility, distance_m: float):
     truth = looking_at_the_ring(distance_m)
-    solution = PnpSolver(PnpCfg(), CAMERA).solve(RING, pixels_of(truth, RING), np.full(6, 0.01), truth[:3, :3].T)
+    solution = PnpSolver(PnpCfg(), CAMERA).solve(
+        RING, pixels_of(truth, RING), np.full(6, 0.01), Attitude(truth[:3, :3].T)
+    )
     assert solution is None or not credibility.holds(solution)
 
 
@@ -86,7 +90,7 @@ def test_a_range_is_believed_as_far_as_the_span_of_the_lights_tells_it(credibili
     for distance_m in (5.0, 8.0, 14.0, 20.0):
         truth = looking_at_the_ring(distance_m)
         pixels = pixels_of(truth, RING)
-        solution = PnpSolver(PnpCfg(), CAMERA).solve(RING, pixels, np.full(6, 4.0), truth[:3, :3].T)
+        solution = PnpSolver(PnpCfg(), CAMERA).solve(RING, pixels, np.full(6, 4.0), Attitude(truth[:3, :3].T))
         assert solution is not None
         share = 4.0 / math.sqrt(float(((pixels - pixels.mean(axis=0)) ** 2).sum()))
         assert credibility.holds(solution) == (share < 0.1), (distance_m, share)
@@ -182,9 +186,9 @@ def test_the_noise_that_lights_show_is_learnt(credibility: Credibility, true_px:
     def after(noise: float, shift_px: Array, prior_error: Array) -> float:
         truth, _ = random_motion(rng, RING).at(0.0)
         sigma = np.full(6, SIGMA_PX * math.sqrt(noise))
-        solution = solver.solve(RING, pixels_of(truth, RING) + shift_px, sigma, prior_error @ truth[:3, :3].T)
+        solution = solver.solve(RING, pixels_of(truth, RING) + shift_px, sigma, Attitude(prior_error @ truth[:3, :3].T))
         assert solution is not None
-        return credibility.noise_after(noise, solution, sigma)
+        return credibility.noise_after(noise, solution)
 
     for error_deg, every, least, most in ((0.0, 1000, 0.8, 1.2), (1.0, 1000, 0.8, 1.2), (1.0, 10, 0.8, 3.0)):
         noise, error = 1.0, turned(rng, math.radians(error_deg))

@@ -14,7 +14,8 @@ from auvdock.core.arrays import Array
 from auvdock.core.camera import CameraCfg, make_camera
 from auvdock.core.contracts import Proprioception
 from auvdock.core.transforms import rotation_from_euler_zyx
-from auvdock.perception.labelled import labelled_lights
+from auvdock.numeric.tracks import Track
+from auvdock.perception.labelled import gather_lights
 from auvdock.perception.prior import AttitudePrior
 
 
@@ -25,30 +26,32 @@ def test_lights_are_those_that_numpy_finds(seed: int, tracks: int, seen_share: f
     array_m, centre_px = rng.normal(size=(8, 3)), rng.uniform(0.0, 600.0, (tracks, 2))
     half = rng.uniform(0.5, 10.0, (tracks, 2))
     xyxy = np.hstack([centre_px - half, centre_px + half])
-    numbers = rng.uniform(1.0, 600.0, (tracks, 13))
-    labels = rng.integers(0, 5, (tracks, 6))
-    labels[:, 2] = np.where(np.arange(tracks) < 8, np.arange(tracks), -1)
-    labels[:, 2] = rng.permutation(np.where(rng.uniform(size=tracks) < 0.7, labels[:, 2], -1))
-    labels[:, 5] = np.where(rng.uniform(size=tracks) < seen_share, rng.permutation(tracks), -1)
-    lights, owners, seen = labelled_lights(numbers, labels, centre_px, xyxy, (640, 360), array_m, 0.5)
+    place, variance = rng.uniform(1.0, 600.0, (tracks, 2)), rng.uniform(1.0, 600.0, tracks)
+    beacon = np.where(np.arange(tracks) < 8, np.arange(tracks), -1)
+    beacon = rng.permutation(np.where(rng.uniform(size=tracks) < 0.7, beacon, -1))
+    detection = np.where(rng.uniform(size=tracks) < seen_share, rng.permutation(tracks), -1)
+    table = Track.zeros(tracks)
+    table["centre_px"], table["p00_px2"] = place, variance
+    table["beacon_id"], table["detection"] = beacon, detection
+    lights, owners, seen = gather_lights(table, centre_px, xyxy, (640, 360), array_m, 0.5)
 
-    rows = np.flatnonzero(labels[:, 2] >= 0)
-    rows = rows[np.argsort(labels[rows, 2])]
-    there = rows[labels[rows, 5] >= 0]
+    rows = np.flatnonzero(beacon >= 0)
+    rows = rows[np.argsort(beacon[rows])]
+    there = rows[detection[rows] >= 0]
     assert seen == len(there)
     rows = there if len(there) >= 4 else rows
-    found = labels[rows, 5] >= 0
-    assert owners[:, 0].tolist() == rows.tolist()
-    assert owners[:, 1].tolist() == labels[rows, 2].tolist()
-    assert lights[:, :3].tolist() == array_m[labels[rows, 2]].tolist()
-    pixels = np.where(found[:, None], centre_px[labels[rows, 5]], numbers[rows, :2])
-    assert lights[:, 3:5].tolist() == pixels.tolist()
-    boxes = xyxy[labels[rows, 5]]
+    found = detection[rows] >= 0
+    assert owners["track"].tolist() == rows.tolist()
+    assert owners["beacon"].tolist() == beacon[rows].tolist()
+    assert lights["place_m"].tolist() == array_m[beacon[rows]].tolist()
+    pixels = np.where(found[:, None], centre_px[detection[rows]], place[rows])
+    assert lights["centre_px"].tolist() == pixels.tolist()
+    boxes = xyxy[detection[rows]]
     cut = (boxes[:, :2] <= 0.0).any(axis=1) | (boxes[:, 2:] >= np.array([639.0, 359.0])).any(axis=1)
     half_box = 0.5 * (boxes[:, 2:] - boxes[:, :2]).max(axis=1) if len(rows) else np.zeros(0)
-    sigma = np.where(found, 0.5 + cut * half_box, 0.5 + np.sqrt(numbers[rows, 4]))
-    assert lights[:, 5] == pytest.approx(sigma)
-    assert lights[:, 6].tolist() == found.tolist()
+    sigma = np.where(found, 0.5 + cut * half_box, 0.5 + np.sqrt(variance[rows]))
+    assert lights["sigma_px"] == pytest.approx(sigma)
+    assert lights["is_seen"].tolist() == found.tolist()
 
 
 def rotation_z(angle_rad: float) -> Array:

@@ -14,7 +14,7 @@ from perception_scenes import ARRAY, CAMERA, LAYOUT, pixels_of, random_motion
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.core.transforms import invert, make_transform, rotation_from_euler_zyx
-from auvdock.perception.pnp import PnpCfg, PnpSolver, translation_from_rotation
+from auvdock.perception.pnp import Attitude, PnpCfg, PnpSolver, translation_from_rotation
 
 LIGHT_ALONE = PnpCfg(attitude_prior_sigma_deg=0.0)
 POINTS = np.ascontiguousarray(LAYOUT.positions_m[ARRAY])
@@ -53,20 +53,22 @@ def test_round_trip(seed: int, count: int, error: tuple[float, float, float], le
     solver = PnpSolver(LIGHT_ALONE, CAMERA)
     pixels = pixels_of(T_station_camera, POINTS[chosen])
     prior = turned(T_camera_station[:3, :3], error)
-    solution = solver.solve(POINTS[chosen], pixels, np.full(count, 0.5), prior)
+    solution = solver.solve(POINTS[chosen], pixels, np.full(count, 0.5), Attitude(prior))
     assert solution is not None
     assert solution.solver == ("sqpnp" if count >= 5 else "iterative")
     if lean:
         # From last frame's pose: a little off, as after a frame of motion.
         moved = random_step(T_station_camera, rng)
-        solution = solver.solve(POINTS[chosen], pixels_of(moved, POINTS[chosen]), np.full(count, 0.5), prior, solution)
+        solution = solver.solve(
+            POINTS[chosen], pixels_of(moved, POINTS[chosen]), np.full(count, 0.5), Attitude(prior), solution
+        )
         T_station_camera = moved
         assert solution is not None
         assert solution.solver == "tracked"
     found = solution.T_station_camera()
     np.testing.assert_allclose(found[:3, 3], T_station_camera[:3, 3], rtol=0, atol=1e-6)
     assert np.abs(found[:3, :3] - T_station_camera[:3, :3]).max() < 1e-6
-    assert solution.residual_px.max() < (0.005 if lean else 1e-4)
+    assert solution.error_px < (0.005 if lean else 1e-4)
 
 
 def random_step(T_station_camera: Array, rng: np.random.Generator) -> Array:
@@ -87,7 +89,7 @@ def test_covariance_matches_scatter(distance_m: float, off_axis_deg: float):
     deviations: list[Array] = []
     for _ in range(400):
         noisy = exact + rng.normal(0.0, 0.5, exact.shape)
-        solution = solver.solve(POINTS, noisy, np.full(6, 0.5), R_camera_station)
+        solution = solver.solve(POINTS, noisy, np.full(6, 0.5), Attitude(R_camera_station))
         assert solution is not None
         found = solution.T_station_camera()
         turn, _ = cv2.Rodrigues(T[:3, :3].T @ found[:3, :3])
@@ -120,7 +122,7 @@ def test_planar_ambiguity_is_resolved():
     for _ in range(300):
         noisy = exact + rng.normal(0.0, 1.0, exact.shape)
         prior = turned(R_camera_station, tuple(rng.normal(0.0, 2.0, 3).tolist()))
-        solution = solver.solve(POINTS, noisy, np.full(6, 1.0), prior)
+        solution = solver.solve(POINTS, noisy, np.full(6, 1.0), Attitude(prior))
         assert solution is not None
         assert rotation_error_rad(solution.rotation, R_camera_station) < math.radians(20.0)
         _, rotations, _, errors = cv2.solvePnPGeneric(
@@ -145,7 +147,7 @@ def test_attitude_prior_in_the_least_squares():
         prior = turned(R_camera_station, tuple(rng.normal(0.0, 2.0, 3).tolist()))
         pair: list[float] = []
         for solver in (alone, helped):
-            solution = solver.solve(POINTS, noisy, np.full(6, 0.5), prior)
+            solution = solver.solve(POINTS, noisy, np.full(6, 0.5), Attitude(prior))
             assert solution is not None
             pair.append(float(np.linalg.norm(solution.T_station_camera()[:3, 3] - T[:3, 3])))
         errors.append((pair[0], pair[1]))
@@ -167,7 +169,7 @@ def test_too_few_lights_give_no_pose(count: int):
     T = view(5.0, 0.0)
     solver = PnpSolver(PnpCfg(), CAMERA)
     pixels = pixels_of(T, POINTS)[:count]
-    assert solver.solve(POINTS[:count], pixels, np.full(count, 0.5), T[:3, :3].T) is None
+    assert solver.solve(POINTS[:count], pixels, np.full(count, 0.5), Attitude(T[:3, :3].T)) is None
 
 
 def test_pose_far_from_the_vehicles_attitude_is_refused():
@@ -175,7 +177,7 @@ def test_pose_far_from_the_vehicles_attitude_is_refused():
     T = view(5.0, 0.0)
     solver = PnpSolver(PnpCfg(), CAMERA)
     pixels = pixels_of(T, np.roll(POINTS, 1, axis=0))
-    assert solver.solve(POINTS, pixels, np.full(6, 0.5), T[:3, :3].T) is None
+    assert solver.solve(POINTS, pixels, np.full(6, 0.5), Attitude(T[:3, :3].T)) is None
 
 
 @pytest.mark.parametrize("field", ["max_reprojection_px", "attitude_sigma_deg", "max_attitude_error_deg"])

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from auvdock.numeric.lights import ATTITUDE, COST, COVARIANCE, ERROR, RESIDUAL, ROTATION, TRANSFORM, TRANSLATION
+from auvdock.numeric.lights import Light, Pose, Solution
 from auvdock.numeric.rotations import left_jacobian, rotation_of, vector_of
-from auvdock.perception.pnp_refine import _project, solve_from
+from auvdock.perception.pnp_refine import image_lights, solve_from
 
 LENS = (350.0, 347.0, 321.0, 177.5)
 MATRIX = np.array([[350.0, 0.0, 321.0], [0.0, 347.0, 177.5], [0.0, 0.0, 1.0]])
@@ -18,22 +18,34 @@ def test_pixels_and_derivatives_are_opencvs(distortion):
     terms = np.array(distortion)
     for _ in range(20):
         pose = np.concatenate([rng.normal(size=3), rng.uniform((-1.0, -1.0, 3.0), (1.0, 1.0, 9.0))])
-        points = rng.uniform(-1.0, 1.0, (7, 3))
+        points, lights = rng.uniform(-1.0, 1.0, (7, 3)), Light.zeros(7)
+        lights["place_m"] = points
         pixels, jacobian = np.empty((7, 2)), np.empty((7, 2, 6))
-        _project(pose, points, np.array([*LENS, *distortion, 0.0]), pixels, jacobian)
+        image_lights(pose, lights, np.array([*LENS, *distortion]), pixels, jacobian)
         wanted, derivatives = cv2.projectPoints(points, pose[:3], pose[3:], MATRIX, terms)
         assert pixels == pytest.approx(wanted.reshape(7, 2), abs=1e-9)
         assert jacobian.reshape(14, 6) == pytest.approx(derivatives[:, :6], rel=1e-9, abs=1e-7)
 
 
+def imaged(lights, pose):
+    """(n, 2) images by OpenCV."""
+    return cv2.projectPoints(lights["place_m"].copy(), pose[:3], pose[3:], MATRIX, np.zeros(5))[0].reshape(-1, 2)
+
+
+def refined(pose, lights, prior, weight, heading_weight, decrement):
+    solution, lens = Solution.zeros(), np.array([*LENS, *np.zeros(5)])
+    start = Pose(pose[:3], pose[3:]).packed()
+    solve_from(start, lights, prior, lens, weight, heading_weight, decrement, solution)
+    return Solution.read(solution)
+
+
 def scene(rng, count):
-    """Lights of a table, σ and the pose that they are seen from, with a prior some degrees off."""
+    """Lights with σ and the pose that they are seen from, with a prior some degrees off."""
     pose = np.concatenate([rng.normal(size=3), rng.uniform((-1.0, -1.0, 3.0), (1.0, 1.0, 9.0))])
-    lights = np.ones((count, 7))
-    lights[:, :3] = rng.uniform(-1.0, 1.0, (count, 3))
-    lights[:, 3:5] = cv2.projectPoints(lights[:, :3].copy(), pose[:3], pose[3:], MATRIX, np.zeros(5))[0].reshape(-1, 2)
-    lights[:, 3:5] += rng.normal(0.0, 0.3, (count, 2))
-    lights[:, 5] = rng.uniform(0.3, 1.0, count)
+    lights = Light.zeros(count)
+    lights["place_m"] = rng.uniform(-1.0, 1.0, (count, 3))
+    lights["centre_px"] = imaged(lights, pose) + rng.normal(0.0, 0.3, (count, 2))
+    lights["sigma_px"], lights["is_seen"] = rng.uniform(0.3, 1.0, count), True
     prior = rotation_of(rng.normal(0.0, 0.05, 3)) @ rotation_of(pose[:3])
     return pose, lights, prior
 
@@ -45,34 +57,31 @@ def test_all_that_follows_from_a_pose(unseen, heading_weight):
     rng = np.random.default_rng(8)
     for _ in range(20):
         pose, lights, prior = scene(rng, 7)
-        lights[:unseen, 6] = 0.0
-        terms = np.array([*LENS, *np.zeros(5), 200.0])
-        result = solve_from(pose, lights, prior, terms, heading_weight, 1e-12)
-        r, t = result[:TRANSLATION], result[TRANSLATION:ROTATION]
-        rotation = result[ROTATION:TRANSFORM].reshape(3, 3)
+        lights["is_seen"][:unseen] = False
+        result = refined(pose, lights, prior, 200.0, heading_weight, 1e-12)
+        r, t = result.pose.rotation_vector, result.pose.translation_m
+        rotation = result.rotation
         assert rotation == pytest.approx(cv2.Rodrigues(r)[0], abs=1e-12)
-        transform = result[TRANSFORM:COVARIANCE].reshape(4, 4)
-        assert transform @ np.vstack([np.column_stack([rotation, t]), [0, 0, 0, 1]]) == pytest.approx(
+        assert result.T_station_camera @ np.vstack([np.column_stack([rotation, t]), [0, 0, 0, 1]]) == pytest.approx(
             np.eye(4), abs=1e-12
         )
-        image, derivatives = cv2.projectPoints(lights[:, :3].copy(), r, t, MATRIX, np.zeros(5))
-        gap = image.reshape(-1, 2) - lights[:, 3:5]
+        image, derivatives = cv2.projectPoints(lights["place_m"].copy(), r, t, MATRIX, np.zeros(5))
+        gap = image.reshape(-1, 2) - lights["centre_px"]
         residual = np.linalg.norm(gap, axis=1)
-        assert result[RESIDUAL:] == pytest.approx(residual, abs=1e-4)
-        counted = lights[:, 6] > 0.0 if unseen < 7 else np.ones(7, dtype=bool)
-        assert result[ERROR] == pytest.approx(residual[counted].mean(), abs=1e-4)
+        counted = lights["is_seen"] if unseen < 7 else np.ones(7, dtype=bool)
+        assert result.error_px == pytest.approx(residual[counted].mean(), abs=1e-4)
         angle = np.linalg.norm(cv2.Rodrigues(rotation @ prior.T)[0])
-        assert result[ATTITUDE] == pytest.approx(angle, abs=1e-7)
+        assert result.attitude_error_rad == pytest.approx(angle, abs=1e-7)
         # The prior: 200 about any axis but the station's upright one.
         up = prior[:, 2]
         turned = left_jacobian(vector_of(prior))
         weight = turned.T @ (200.0 * np.eye(3) + (heading_weight - 200.0) * np.outer(up, up)) @ turned
         off = r - vector_of(prior)
-        assert result[COST] == pytest.approx(np.sum((residual / lights[:, 5]) ** 2) + off @ weight @ off, rel=1e-5)
-        jacobian = derivatives[:, :6] / np.repeat(lights[:, 5], 2)[:, None]
+        assert result.cost == pytest.approx(np.sum((residual / lights["sigma_px"]) ** 2) + off @ weight @ off, rel=1e-5)
+        jacobian = derivatives[:, :6] / np.repeat(lights["sigma_px"], 2)[:, None]
         normal = jacobian.T @ jacobian
         normal[:3, :3] += weight
-        gradient = jacobian.T @ (gap / lights[:, 5:6]).ravel()
+        gradient = jacobian.T @ (gap / lights["sigma_px"][:, None]).ravel()
         gradient[:3] += weight @ off
         assert gradient @ np.linalg.solve(normal, gradient) < 1e-6
         # Position -Rᵀ t and the camera's turn, by differences.
@@ -83,12 +92,12 @@ def test_all_that_follows_from_a_pose(unseen, heading_weight):
             turn = high @ low.T
             to[3:, k] = -0.5 * (turn - turn.T)[[2, 0, 1], [1, 2, 0]] / 2e-6
         wanted = to @ np.linalg.inv(normal) @ to.T
-        assert result[COVARIANCE:ATTITUDE].reshape(6, 6) == pytest.approx(wanted, rel=1e-3, abs=1e-4 * wanted.max())
+        assert result.covariance == pytest.approx(wanted, rel=1e-3, abs=1e-4 * wanted.max())
 
 
 def test_a_pose_behind_the_camera_has_no_cost():
     pose, lights, prior = scene(np.random.default_rng(9), 5)
     pose[5] = -pose[5]
-    lights[:, 3:5] = cv2.projectPoints(lights[:, :3].copy(), pose[:3], pose[3:], MATRIX, np.zeros(5))[0].reshape(-1, 2)
-    result = solve_from(pose, lights, prior, np.array([*LENS, *np.zeros(6)]), 0.0, 1e-9)
-    assert np.isnan(result[COST])
+    lights["centre_px"] = imaged(lights, pose)
+    result = refined(pose, lights, prior, 0.0, 0.0, 1e-9)
+    assert np.isnan(result.cost)

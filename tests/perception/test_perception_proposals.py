@@ -13,6 +13,7 @@ from perception_scenes import ARRAY, LAYOUT, random_motion
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.contracts import BLUE, RED
 from auvdock.core.transforms import invert, rotation_from_euler_zyx
+from auvdock.numeric.tracks import Track
 from auvdock.perception.authentication import symmetric_pairs
 from auvdock.perception.proposals import propose, surest_lights
 
@@ -92,12 +93,13 @@ def test_too_few_candidates_propose_nothing(count: int):
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(0, 15), most=st.integers(1, 12))
 def test_candidates_are_numpys(seed: int, count: int, most: int):
     rng = np.random.default_rng(seed)
-    numbers, labels = np.zeros((count, 13)), np.zeros((count, 6), dtype=np.int64)
+    tracks = Track.zeros(count)
     # Few different scores, so that equally sure ones turn up.
-    numbers[:, 7:] = rng.choice([0.0, 0.0, 0.25, 0.5], (count, 6))
-    labels[:, 1], labels[:, 5] = rng.choice([BLUE, RED], count, p=[0.8, 0.2]), rng.integers(-1, 9, count)
-    rows = surest_lights(numbers, labels, 3, 0.3, most)
-    occurrences = np.count_nonzero(numbers[:, 7:], axis=1)
-    confidence = numbers[:, 7:].sum(axis=1) / np.maximum(occurrences, 1)
-    good = np.flatnonzero((labels[:, 1] == BLUE) & (labels[:, 5] >= 0) & (occurrences >= 3) & (confidence >= 0.3))
+    scores = rng.choice([0.0, 0.0, 0.25, 0.5], (count, 6))
+    blue, detection = rng.uniform(size=count) < 0.8, rng.integers(-1, 9, count)
+    tracks["class_id"], tracks["detection"] = np.where(blue, BLUE, RED), detection
+    rows = surest_lights(tracks, scores, 3, 0.3, most)
+    occurrences = np.count_nonzero(scores, axis=1)
+    confidence = scores.sum(axis=1) / np.maximum(occurrences, 1)
+    good = np.flatnonzero(blue & (detection >= 0) & (occurrences >= 3) & (confidence >= 0.3))
     assert rows.tolist() == good[np.argsort(-confidence[good], kind="stable")][:most].tolist()

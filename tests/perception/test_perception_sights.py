@@ -11,12 +11,14 @@ from perception_scenes import ARRAY, CAMERA, FAR, LAYOUT, RED
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.contracts import BLUE
 from auvdock.core.contracts import RED as RED_CLASS
+from auvdock.numeric.lights import Solution
+from auvdock.numeric.records import Records
 from auvdock.numeric.rotations import rotation_of
-from auvdock.perception.sights import ENTRANCE, FOLLOWED, LONG_RANGE, SCORE, find_sights, sight_terms
+from auvdock.numeric.tracks import Track
+from auvdock.perception.sights import ENTRANCE, LONG_RANGE, Sight, SightLaw, find_sights
 
 MIN_OCCURRENCES, MAX_MISSED, GROUP_SIZE, LOYALTY = 3, 5, 3, 0.7
-TERMS = sight_terms(CAMERA, LAYOUT, MIN_OCCURRENCES, MAX_MISSED, GROUP_SIZE, LOYALTY)
-NO_POSE = np.zeros(0)
+NO_POSE = Solution.zeros(0)
 WINDOW = 6
 
 
@@ -28,27 +30,33 @@ SPREADS_M = {
     BLUE: spread_m(LAYOUT.positions_m[[*ARRAY, FAR]]),
     RED_CLASS: spread_m(LAYOUT.positions_m[RED]),
 }
+LENS = np.array([*CAMERA.matrix[[0, 1, 0, 1], [0, 1, 2, 2]], *CAMERA.distortion])
+CENTRE_M = LAYOUT.array_positions_m.mean(axis=0)
+LAW = SightLaw(
+    LENS, SPREADS_M[BLUE], SPREADS_M[RED_CLASS], CENTRE_M, MIN_OCCURRENCES, MAX_MISSED, GROUP_SIZE, LOYALTY
+).packed()
 
 
-def tables(rng: np.random.Generator, count: int, apart_px: float) -> tuple[Array, IntArray]:
+def tables(rng: np.random.Generator, count: int, apart_px: float) -> tuple[Records[Track], Array]:
     """Tracks about one place, some far off, with scores and counts on either side of every threshold."""
-    numbers, labels = np.zeros((count, 7 + WINDOW)), np.zeros((count, 6), dtype=np.int64)
+    tracks = Track.zeros(count)
     place = rng.uniform((0.0, 0.0), (640.0, 360.0))
     # Far outside the image no iteration on the distortion ends: OpenCV's as little as ours.
-    numbers[:, :2] = np.clip(place + rng.normal(0.0, apart_px, (count, 2)), 0.0, (639.0, 359.0))
+    centre = np.clip(place + rng.normal(0.0, apart_px, (count, 2)), 0.0, (639.0, 359.0))
     stray = rng.uniform(size=count) < 0.15
-    numbers[stray, :2] = rng.uniform((0.0, 0.0), (639.0, 359.0), (int(stray.sum()), 2))
-    numbers[:, 7:] = rng.uniform(0.2, 1.2, (count, WINDOW)) * (rng.uniform(size=(count, WINDOW)) < 0.75)
-    labels[:, 0] = rng.permutation(1000)[:count]
-    labels[:, 1] = rng.choice([BLUE, RED_CLASS], count)
-    labels[:, 3] = rng.integers(0, 8, count) * (rng.uniform(size=count) < 0.3)
-    labels[:, 4] = rng.integers(1, 20, count)
-    return numbers, labels
+    centre[stray] = rng.uniform((0.0, 0.0), (639.0, 359.0), (int(stray.sum()), 2))
+    scores = rng.uniform(0.2, 1.2, (count, WINDOW)) * (rng.uniform(size=(count, WINDOW)) < 0.75)
+    tracks["centre_px"] = centre
+    tracks["track_id"] = rng.permutation(1000)[:count]
+    tracks["class_id"] = rng.choice([BLUE, RED_CLASS], count)
+    tracks["missed"] = rng.integers(0, 8, count) * (rng.uniform(size=count) < 0.3)
+    tracks["hits"] = rng.integers(1, 20, count)
+    return tracks, scores
 
 
-def steady(numbers: Array, labels: IntArray, class_id: int) -> IntArray:
-    good = (labels[:, 1] == class_id) & (labels[:, 4] >= MIN_OCCURRENCES) & (labels[:, 3] <= MAX_MISSED)
-    return np.flatnonzero(good & (np.count_nonzero(numbers[:, 7:], axis=1) >= MIN_OCCURRENCES))
+def steady(tracks: Records[Track], scores: Array, class_id: int) -> IntArray:
+    good = (tracks["class_id"] == class_id) & (tracks["hits"] >= MIN_OCCURRENCES) & (tracks["missed"] <= MAX_MISSED)
+    return np.flatnonzero(good & (np.count_nonzero(scores, axis=1) >= MIN_OCCURRENCES))
 
 
 def bearing(pixel: Array, score: float, range_m: float) -> Array:
@@ -70,24 +78,35 @@ def group(pixels: Array, weight: Array, spread: float) -> Array:
     return bearing(pixels.mean(axis=0), float(weight.mean()), float(range_m))
 
 
-def plain(numbers: Array, labels: IntArray, followed: int) -> Array:
-    """What `find_sights` gives without a pose."""
-    result = np.full(15, np.nan)
-    result[FOLLOWED] = followed
-    weight = numbers[:, 7:].mean(axis=1)
-    red, blue = steady(numbers, labels, RED_CLASS), steady(numbers, labels, BLUE)
+def plain(tracks: Records[Track], scores: Array, followed: int) -> tuple[Array, Array, int]:
+    """What `find_sights` gives without a pose: seven numbers of either bearing, nan for none, and the track."""
+    long_range, entrance = np.full((2, 7), np.nan)
+    weight, centre = scores.mean(axis=1), tracks["centre_px"]
+    red, blue = steady(tracks, scores, RED_CLASS), steady(tracks, scores, BLUE)
     if len(red):
-        result[ENTRANCE:FOLLOWED] = group(numbers[red, :2], weight[red], SPREADS_M[RED_CLASS])
+        entrance = group(centre[red], weight[red], SPREADS_M[RED_CLASS])
     if len(blue) >= GROUP_SIZE:
-        result[LONG_RANGE:ENTRANCE] = group(numbers[blue, :2], weight[blue], SPREADS_M[BLUE])
+        long_range = group(centre[blue], weight[blue], SPREADS_M[BLUE])
     elif len(blue):
         best = blue[np.argmax(weight[blue])]
-        loyal = blue[labels[blue, 0] == followed]
+        loyal = blue[tracks["track_id"][blue] == followed]
         if len(loyal) and weight[loyal[0]] >= LOYALTY * weight[best]:
             best = loyal[0]
-        result[LONG_RANGE:ENTRANCE] = bearing(numbers[best, :2], weight[best], np.nan)
-        result[FOLLOWED] = labels[best, 0]
-    return result
+        long_range = bearing(centre[best], weight[best], np.nan)
+        followed = int(tracks["track_id"][best])
+    return long_range, entrance, followed
+
+
+def numbers(sights: Records[Sight], row: int) -> Array:
+    """Seven numbers of a bearing, nan for none."""
+    sight = Sight.read(sights, row)
+    if np.isnan(sight.score):
+        return np.full(7, np.nan)
+    return np.array([*sight.ray_camera, *sight.pixel, sight.score, sight.range_m])
+
+
+def same(sights: Records[Sight], row: int, wanted: Array) -> None:
+    np.testing.assert_allclose(numbers(sights, row), wanted, rtol=1e-9, atol=1e-8)
 
 
 @settings(max_examples=200, deadline=None)
@@ -99,29 +118,31 @@ def plain(numbers: Array, labels: IntArray, followed: int) -> Array:
 )
 def test_bearings_equal_the_plain_ones(seed: int, count: int, apart_px: float, loyal: bool):
     rng = np.random.default_rng(seed)
-    numbers, labels = tables(rng, count, apart_px)
-    followed = int(rng.choice(labels[:, 0])) if loyal and count else -1
-    found = find_sights(numbers, labels, NO_POSE, TERMS, followed)
-    np.testing.assert_allclose(found, plain(numbers, labels, followed), rtol=1e-9, atol=1e-8)
+    tracks, scores = tables(rng, count, apart_px)
+    before = int(rng.choice(tracks["track_id"])) if loyal and count else -1
+    sights, followed = find_sights(tracks, scores, NO_POSE, LAW, before)
+    long_range, entrance, wanted = plain(tracks, scores, before)
+    same(sights, LONG_RANGE, long_range)
+    same(sights, ENTRANCE, entrance)
+    assert followed == wanted
 
 
 def test_pose_gives_the_array_centre_and_leaves_the_entrance():
     rng = np.random.default_rng(4)
-    centre_m = LAYOUT.array_positions_m.mean(axis=0)
     for _ in range(20):
-        numbers, labels = tables(rng, 10, 3.0)
-        vector, t = rng.normal(size=3), rng.uniform((-1.0, -0.5, 3.0), (1.0, 0.5, 9.0))
-        rotation = rotation_of(vector)
-        found = find_sights(numbers, labels, np.concatenate([vector, t, rotation.ravel()]), TERMS, 7)
-        centre = rotation @ centre_m + t
+        tracks, scores = tables(rng, 10, 3.0)
+        rotation, t = rotation_of(rng.normal(size=3)), rng.uniform((-1.0, -0.5, 3.0), (1.0, 0.5, 9.0))
+        solution = Solution.zeros()
+        solution["rotation"], solution["pose"]["translation_m"] = rotation, t
+        sights, followed = find_sights(tracks, scores, solution, LAW, 7)
+        centre = rotation @ CENTRE_M + t
         wanted = [*centre / np.linalg.norm(centre), *CAMERA.project(centre[None])[0], 1.0, np.linalg.norm(centre)]
-        assert found[LONG_RANGE:ENTRANCE] == pytest.approx(wanted)
-        expected = plain(numbers, labels, -1)[ENTRANCE:FOLLOWED]
-        np.testing.assert_allclose(found[ENTRANCE:FOLLOWED], expected, rtol=1e-9, atol=1e-8)
-        assert found[FOLLOWED] == 7
+        assert numbers(sights, LONG_RANGE) == pytest.approx(wanted)
+        same(sights, ENTRANCE, plain(tracks, scores, -1)[1])
+        assert followed == 7
 
 
 def test_no_track_no_bearing():
-    found = find_sights(np.zeros((0, 13)), np.zeros((0, 6), dtype=np.int64), NO_POSE, TERMS, 3)
-    assert np.isnan(found[[LONG_RANGE + SCORE, ENTRANCE + SCORE]]).all()
-    assert found[FOLLOWED] == 3
+    sights, followed = find_sights(Track.zeros(0), np.zeros((0, WINDOW)), NO_POSE, LAW, 3)
+    assert np.isnan(sights["score"]).all()
+    assert followed == 3

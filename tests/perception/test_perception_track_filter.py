@@ -12,6 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import BLUE, RED, Detections
+from auvdock.numeric.tracks import Track
 from auvdock.perception.tracker import LightTracker, TrackerCfg
 
 RATE_HZ = 30.0
@@ -21,7 +22,7 @@ F = np.array([[1.0, DT], [0.0, 1.0]])
 
 
 @dataclass
-class Track:
+class PlainTrack:
     """x is (2, 2): position and velocity, one column for each axis."""
 
     track_id: int
@@ -37,7 +38,7 @@ class Track:
 @dataclass
 class PlainTracker:
     cfg: TrackerCfg
-    tracks: list[Track] = field(default_factory=list)
+    tracks: list[PlainTrack] = field(default_factory=list)
     next_id: int = 0
 
     def update(self, seen: Detections) -> None:
@@ -62,7 +63,7 @@ class PlainTracker:
             x = np.array([seen.centre_px[j], [0.0, 0.0]])
             p = np.diag([variance[j], cfg.initial_speed_px_s**2])
             scores = [float(seen.score[j])]
-            self.tracks.append(Track(self.next_id, int(seen.class_id[j]), x, p, scores, detection=j))
+            self.tracks.append(PlainTrack(self.next_id, int(seen.class_id[j]), x, p, scores, detection=j))
             self.next_id += 1
 
     def _assign(self, seen: Detections, variance: Array) -> None:
@@ -78,7 +79,7 @@ class PlainTracker:
             if cost[i, j] != 40.0:
                 self.tracks[i].detection = int(j)
 
-    def _goes_on(self, track: Track) -> bool:
+    def _goes_on(self, track: PlainTrack) -> bool:
         cfg, (u, v) = self.cfg, track.x[0]
         most = cfg.max_predicted_frames if track.hits >= cfg.confirm_hits else cfg.max_tentative_frames
         inside = -0.1 * WIDTH_PX < u < 1.1 * WIDTH_PX and -0.1 * HEIGHT_PX < v < 1.1 * HEIGHT_PX
@@ -90,9 +91,11 @@ def same(lights: LightTracker, plain: PlainTracker) -> None:
     for name in ("track_id", "class_id", "missed", "hits", "detection"):
         assert getattr(lights, name).tolist() == [getattr(track, name) for track in plain.tracks]
     for row, track in enumerate(plain.tracks):
-        np.testing.assert_allclose(lights.state[row], track.x.ravel(), rtol=1e-9, atol=1e-8)
-        np.testing.assert_allclose(lights.covariance[row], track.p[[0, 0, 1], [0, 1, 1]], rtol=1e-9, atol=1e-12)
-        assert sorted(filter(None, lights.history[row].tolist())) == sorted(filter(None, track.scores))
+        mine = Track.read(lights.table, row)
+        np.testing.assert_allclose([mine.centre_px, mine.velocity_px_s], track.x, rtol=1e-9, atol=1e-8)
+        covariance = [mine.p00_px2, mine.p01_px2_s, mine.p11_px2_s2]
+        np.testing.assert_allclose(covariance, track.p[[0, 0, 1], [0, 1, 1]], rtol=1e-9, atol=1e-12)
+        assert sorted(filter(None, lights.scores[row].tolist())) == sorted(filter(None, track.scores))
 
 
 @settings(max_examples=60, deadline=None)
@@ -141,7 +144,7 @@ def test_room_for_any_number_of_lights():
         assert lights.detection.tolist() == list(range(count))
         assert lights.beacon_id.tolist() == [5 if row == 3 else -1 for row in range(count)]
     assert lights.hits[:20].tolist() == [3] * 20
-    np.testing.assert_allclose(lights.state[:, :2], grid, atol=1e-9)
+    np.testing.assert_allclose(lights.centre_px, grid, atol=1e-9)
     lights.reset()
     assert len(lights) == 0
     show(2)

@@ -11,6 +11,7 @@ from filterpy.kalman import KalmanFilter
 
 from auvdock.core.contracts import BLUE, RED, Detections
 from auvdock.core.errors import ConfigError
+from auvdock.numeric.tracks import Track
 from auvdock.perception.tracker import LightTracker, TrackerCfg
 
 RATE_HZ = 30.0
@@ -55,11 +56,13 @@ def test_equals_filterpy_kalman_filter():
             reference[index].predict()
             if index in visible:
                 reference[index].update(centres[index][:, None], R=noise * np.eye(2))
-        order = np.argsort(mine.state[:, 0])
+        order = np.argsort(mine.centre_px[:, 0])
         for index, row in enumerate(order):
-            np.testing.assert_allclose(mine.state[row], reference[index].x.ravel(), rtol=0, atol=1e-9)
-            p = reference[index].P
-            np.testing.assert_allclose(mine.covariance[row], [p[0, 0], p[0, 2], p[2, 2]], rtol=1e-9)
+            track, p = Track.read(mine.table, int(row)), reference[index].P
+            state = [*track.centre_px, *track.velocity_px_s]
+            np.testing.assert_allclose(state, reference[index].x.ravel(), rtol=0, atol=1e-9)
+            covariance = [track.p00_px2, track.p01_px2_s, track.p11_px2_s2]
+            np.testing.assert_allclose(covariance, [p[0, 0], p[0, 2], p[2, 2]], rtol=1e-9)
 
 
 def test_survives_ten_missed_frames_and_dies_at_the_eleventh():
@@ -71,7 +74,7 @@ def test_survives_ten_missed_frames_and_dies_at_the_eleventh():
         assert len(lights) == 1
         assert lights.missed[0] == missed
     # Prediction runs on at the light's own speed of 1 px a frame; 10 frames at ±1.5 px/s of filter error.
-    assert lights.state[0, 0] == pytest.approx(314.0, abs=1.0)
+    assert lights.centre_px[0, 0] == pytest.approx(314.0, abs=1.0)
     lights.update(Detections.empty())
     assert len(lights) == 0
 
@@ -110,7 +113,8 @@ def test_constant_velocity_is_unbiased():
             truth = np.array([200.0, 150.0]) + velocity * frame * DT
             lights.update(seen(tuple(truth + rng.normal(0.0, 0.5, 2))))
         assert len(lights) == 1
-        errors.append(lights.state[0] - np.concatenate([truth, velocity]))
+        track = Track.read(lights.table)
+        errors.append(np.concatenate([track.centre_px - truth, track.velocity_px_s - velocity]))
     table = np.array(errors)
     standard_error = table.std(axis=0) / np.sqrt(len(table))
     assert (np.abs(table.mean(axis=0)) < 4.0 * standard_error).all()
@@ -144,9 +148,7 @@ def test_no_detection_no_track():
     for _ in range(5):
         lights.update(Detections.empty())
     assert len(lights) == 0
-    assert lights.occurrences().shape == (0,)
     assert lights.mean_confidence().shape == (0,)
-    assert lights.position_sigma_px().shape == (0,)
 
 
 def test_track_that_leaves_the_image_ends():
@@ -162,7 +164,7 @@ def test_window_statistics():
     lights = tracker()
     for frame in range(6):
         lights.update(seen((300.0, 180.0), score=0.6) if frame % 2 == 0 else Detections.empty())
-    assert lights.occurrences().tolist() == [3]
+    assert sorted(lights.scores[0].tolist()) == [0.0] * 3 + [0.6] * 3
     assert lights.mean_confidence()[0] == pytest.approx(0.6)
 
 

@@ -61,7 +61,7 @@ def judged(angles_deg, peak_deg=1.0):
             candidate.add(time_s, spot, RAY, 5.0)
         else:
             candidate.share(time_s, None, None, 5.0)
-    return finder.judge(candidate, 10.0 + 60.0 * per_deg, motion, None)
+    return finder.judge(candidate, 10.0 + 60.0 * per_deg, motion)
 
 
 ALL = set(np.arange(-60.0, 61.0, FRAME_DEG).tolist())

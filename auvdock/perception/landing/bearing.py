@@ -31,10 +31,10 @@ def group_bearing(tracks: LightTracker, camera: Camera, points_m: Array) -> Bear
     rows = np.flatnonzero(steady)
     if len(rows) == 0:
         return None
-    centre = np.median(tracks.state[rows, :2], axis=0)
-    distance = np.linalg.norm(tracks.state[rows, :2] - centre, axis=1)
+    centre = np.median(tracks.centre_px[rows], axis=0)
+    distance = np.linalg.norm(tracks.centre_px[rows] - centre, axis=1)
     rows = rows[distance <= 3.0 * float(np.median(distance)) + 2.0]
-    xy = camera.normalise(tracks.state[rows, :2])
+    xy = camera.normalise(tracks.centre_px[rows])
     mean = xy.mean(axis=0)
     ray = np.array([*mean.tolist(), 1.0])
     ray /= np.linalg.norm(ray)

@@ -25,7 +25,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.limits import Count, OpenShare, at_least
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import HALF_SCORE_SNR
-from auvdock.perception.components import peaked_components
+from auvdock.perception.components import components_and_peaks
 from auvdock.perception.spots import inside, mean_channel, noise_sigma
 
 __all__ = ["CoreCfg", "CoreDetector"]
@@ -93,8 +93,9 @@ class CoreDetector:
         peaks: list[float] = []
         for share in cfg.levels:
             cut = base + share * (peak - base)
-            found = peaked_components(small, cut, np.array(taken, dtype=np.int64).reshape(-1, 2))
-            for x, y, w, h, area, highest, column, row, old in found.tolist():
+            marks = np.array(taken, dtype=np.int64).reshape(-1, 2)
+            found = (records.tolist() for records in components_and_peaks(small, cut, marks))
+            for (x, y, w, h, area), (highest, column, row, old) in zip(*found, strict=True):
                 if old or area < cfg.min_area_px:
                     continue
                 if share < cfg.levels[0] and highest - cut < cfg.prominence * (peak - base):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -68,6 +69,26 @@ class LevelPose:
         return worst_m2 <= max(_MAX_SIGMA_M, _MAX_SIGMA_OF_RANGE * range_m) ** 2
 
 
+class _Fit(NamedTuple):
+    """χ² and what it is made of at one pose.
+
+    Attributes:
+        cost: χ².
+        information: (6, 6) H = JᵀWJ of the pixels.
+        gradient: (6,) JᵀW times their residuals.
+        prior: (6, 6) Λ.
+        prior_gradient: (6,) Λ φ.
+        residual_px: (n,).
+    """
+
+    cost: float
+    information: Array
+    gradient: Array
+    prior: Array
+    prior_gradient: Array
+    residual_px: Array
+
+
 class LevelSolver:
     """Levenberg–Marquardt over (position, rotation) for one camera.
 
@@ -109,18 +130,18 @@ class LevelSolver:
         if len(points_m) < 3 or len(points_m) != len(pixels):
             return None
         position, rotation = start[:3, 3].copy(), start[:3, :3].copy()
-        damping, best = 0.0, math.inf
-        kept: tuple[Array, Array, Array, Array, Array, Array] | None = None
+        damping = 0.0
+        best: _Fit | None = None
         trial = (position, rotation)
         for _ in range(_MAX_ITERATIONS):
-            evaluated = self._evaluate(points_m, pixels, sigma_px, attitude, *trial)
-            if evaluated is not None and evaluated[0] <= best:
-                best, (position, rotation), kept, damping = evaluated[0], trial, evaluated[1:], damping * 0.1
-            elif kept is None:
+            fit = self._evaluate(points_m, pixels, sigma_px, attitude, *trial)
+            if fit is not None and (best is None or fit.cost <= best.cost):
+                best, (position, rotation), damping = fit, trial, damping * 0.1
+            elif best is None:
                 return None
             else:
                 damping = max(10.0 * damping, 1e-3)
-            normal, gradient = kept[0] + kept[2], kept[1] + kept[3]
+            normal, gradient = best.information + best.prior, best.gradient + best.prior_gradient
             damped = normal + np.diag(damping * normal.diagonal()) if damping > 1e-9 else normal
             back = solve_positive(damped, gradient)
             if back is None:
@@ -129,37 +150,31 @@ class LevelSolver:
             if damping <= 1e-9 and float(gradient @ back) < _DECREMENT:
                 break
             trial = (position - back[:3], rotated(rotation, -back[3:]))
-        if kept is None:
+        if best is None:
             return None
-        return self._finish(kept, best, make_transform(rotation, position), sigma_px, ids, solver)
+        return self._finish(best, make_transform(rotation, position), sigma_px, ids, solver)
 
     @staticmethod
     def _finish(
-        kept: tuple[Array, Array, Array, Array, Array, Array],
-        cost: float,
-        T_station_camera: Array,
-        sigma_px: Array,
-        ids: tuple[int, ...],
-        solver: str,
+        fit: _Fit, T_station_camera: Array, sigma_px: Array, ids: tuple[int, ...], solver: str
     ) -> LevelPose | None:
-        information, gradient, prior, _, residual, _ = kept
         # 2 n residuals and three of attitude, less six unknowns.
-        worse = max(1.0, cost / (2 * len(sigma_px) - 3))
-        information, gradient = information / worse, gradient / worse
-        covariance = solve_positive(information + prior, _IDENTITY)
+        worse = max(1.0, fit.cost / (2 * len(sigma_px) - 3))
+        information, gradient = fit.information / worse, fit.gradient / worse
+        covariance = solve_positive(information + fit.prior, _IDENTITY)
         # Three points may leave a direction open: a trace of information keeps the inverse finite.
         open_ = 1e-9 * float(information.trace()) / 6.0
         back = solve_positive(information + open_ * _IDENTITY, gradient)
         if covariance is None or back is None:
             return None
         covariance = 0.5 * (covariance + covariance.T)
-        estimate = PoseEstimate(T_station_camera, covariance, ids, solver, float(residual.mean()))
-        return LevelPose(estimate, information, -back, prior, residual / sigma_px, cost)
+        estimate = PoseEstimate(T_station_camera, covariance, ids, solver, float(fit.residual_px.mean()))
+        return LevelPose(estimate, information, -back, fit.prior, fit.residual_px / sigma_px, fit.cost)
 
     def _evaluate(
         self, points: Array, pixels: Array, sigma: Array, attitude: Array, position: Array, rotation: Array
-    ) -> tuple[float, Array, Array, Array, Array, Array, Array] | None:
-        """(χ², H, gradient of the pixels, Λ, gradient of the prior, residual_px, φ)."""
+    ) -> _Fit | None:
+        """The fit of a pose; None where it has points behind the camera or χ² is not finite."""
         q = (points - position) @ rotation
         if not bool((q[:, 2] > 1e-3).all()):
             return None
@@ -184,7 +199,7 @@ class LevelSolver:
         cost = float(weighted @ weighted) + float(turn @ pulled[3:])
         if not math.isfinite(cost):
             return None
-        return cost, information, gradient, prior, pulled, np.hypot(difference[:, 0], difference[:, 1]), turn
+        return _Fit(cost, information, gradient, prior, pulled, np.hypot(difference[:, 0], difference[:, 1]))
 
 
 def pose_turn(a: Array, b: Array) -> Array:

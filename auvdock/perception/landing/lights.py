@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,13 @@ _BETTER = 9.0
 _FAR = 50.0
 """Squared Mahalanobis distance; beyond the filter's own gate, which comes after and counts its refusals."""
 _WIDE_HEIGHT_M = (0.1, 30.0)
-_Start = tuple[Array, str]
-"""A pose to refine and where it comes from."""
+
+
+class _Start(NamedTuple):
+    """A pose (4, 4) T_station_camera to refine, and what gave it."""
+
+    pose: Array
+    solver: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +101,7 @@ class LightLevel:
                 break
             named = np.where(guess.spot >= 0, index[guess.spot], -1)
             start = invert(make_transform(guess.rotation, guess.translation_m))
-            found = self._solve(detections, named, attitude, (start, "prior"))
+            found = self._solve(detections, named, attitude, _Start(start, "prior"))
             if found is not None and found.count == guess.count:
                 settled.append(found)
         settled.sort(key=lambda found: (-found.count, found.pose.cost))
@@ -131,7 +137,7 @@ class LightLevel:
         gate = np.where(view, np.minimum(_GATE_PX + 4.0 * spread, self._cfg.gate_px), -1.0)
         spot = match(image, detections.centre_px[index], gate)
         named = np.where(spot >= 0, index[spot], -1)
-        return self._solve(detections, named, attitude, (T_station_camera, "tracked"), covariance)
+        return self._solve(detections, named, attitude, _Start(T_station_camera, "tracked"), covariance)
 
     def _solve(
         self, detections: Detections, named: IntArray, attitude: Array, start: _Start, spread: Array | None = None
@@ -148,7 +154,7 @@ class LightLevel:
                 fewer = named.copy()
                 fewer[list(out)] = -1
                 found = self._refined(detections, fewer, attitude, start)
-                if found is None or (spread is not None and _far(found.pose, start[0], spread)):
+                if found is None or (spread is not None and _far(found.pose, start.pose, spread)):
                     continue
                 if best is None or found.pose.cost < best.pose.cost:
                     best = found
@@ -165,10 +171,10 @@ class LightLevel:
         points = self._points_m[lights]
         ids = tuple(lights.tolist())
         starts = [start]
-        if start[1] != "tracked":
+        if start.solver != "tracked":
             own = self._rpnp(points, pixels, attitude)
             if own is not None:
-                starts.insert(0, (own, "rpnp"))
+                starts.insert(0, _Start(own, "rpnp"))
         for T, name in starts:
             pose = self._solver.solve(points, pixels, sigma, attitude, T, ids, name)
             if pose is None or not pose.is_sure(points.mean(axis=0)):
@@ -176,7 +182,7 @@ class LightLevel:
             limit = self._cfg.max_reprojection_px * float(np.maximum(sigma, 1.0).mean())
             if pose.estimate.reprojection_error_px <= limit:
                 spots_n = int((detections.class_id == BLUE).sum())
-                if start[1] != "tracked":  # `find` looked at no more than these
+                if start.solver != "tracked":  # `find` looked at no more than these
                     spots_n = min(spots_n, self._cfg.max_lights_n)
                 return NamedLights(pose, named, self._convinces(pose, sigma, spots_n))
         return None

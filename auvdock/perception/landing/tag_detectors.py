@@ -144,7 +144,7 @@ class ContourTagDetector:
                 number = self._read(smooth, quad)
                 if number is None:
                     continue
-                fitted = _fitted(np.asarray(contour).reshape(-1, 2) + origin, quad + origin, frame)
+                fitted = _fit(np.asarray(contour).reshape(-1, 2) + origin, quad + origin, frame)
                 if fitted is not None:
                     tag_id, turns = number
                     found[tag_id] = TagDetection(tag_id, np.roll(fitted[0], turns, axis=0), fitted[1])
@@ -211,7 +211,7 @@ def _quadrilateral(contour: NDArray[np.int32]) -> Array | None:
     return corners if a[0] * b[1] - a[1] * b[0] > 0.0 else corners[::-1].copy()
 
 
-def _fitted(contour: Array, quad: Array, frame: Frame) -> tuple[Array, float] | None:
+def _fit(contour: Array, quad: Array, frame: Frame) -> tuple[Array, float] | None:
     """Corners where lines through the contour's sides meet, and their standard deviation; sides without their ends."""
     sides: list[Array] = []
     for side in range(4):

@@ -105,17 +105,19 @@ class PaperBForwardBeacon:
     def _best(self) -> ForwardDetection | None:
         if self._detections < self._cfg.min_detections:
             return None
-        rows = np.array(self._rows)
+        time_s, *columns = np.array(self._rows).T
         if self._cfg.interpolate:
-            count = round((rows[-1, 0] - rows[0, 0]) / self._dt_s) + 1
-            times = np.union1d(rows[:, 0], rows[0, 0] + self._dt_s * np.arange(count))
+            count = round((time_s[-1] - time_s[0]) / self._dt_s) + 1
+            times = np.union1d(time_s, time_s[0] + self._dt_s * np.arange(count))
             # A frame that is there within a tenth of a period needs no filling.
-            missing = np.abs(times[:, None] - rows[:, 0]).min(axis=1) > 0.1 * self._dt_s
-            times = np.sort(np.concatenate([rows[:, 0], times[missing]]))
-            rows = np.column_stack([times, *(np.interp(times, rows[:, 0], rows[:, k]) for k in range(1, 5))])
-        width, height = np.maximum(rows[:, 1], 1e-9), np.maximum(rows[:, 2], 1e-9)
+            missing = np.abs(times[:, None] - time_s).min(axis=1) > 0.1 * self._dt_s
+            times = np.sort(np.concatenate([time_s, times[missing]]))
+            columns = [np.interp(times, time_s, column) for column in columns]
+            time_s = times
+        width, height, u, v = columns
+        width, height = np.maximum(width, 1e-9), np.maximum(height, 1e-9)
         area = width * height
         shape = np.minimum(width, height) / np.maximum(width, height)
         score = self._cfg.area_weight * area / area.max() + self._cfg.shape_weight * shape
         best = int(score.argmax())
-        return ForwardDetection(float(rows[best, 0]), rows[best, 3:5].copy(), float(score[best]), self._detections)
+        return ForwardDetection(float(time_s[best]), np.array([u[best], v[best]]), float(score[best]), self._detections)

@@ -82,7 +82,7 @@ class ForwardBeacon:
         owner, parts = self._candidates.update(spots, place, self._own, lit)
         fix: AzimuthFix | None = None
         for candidate in self._candidates.all:
-            new = self._finder.judge(candidate, place.time_s, self._motion, None)
+            new = self._finder.judge(candidate, place.time_s, self._motion)
             if new is not None and (found := self._take(candidate, new)) is not None:
                 fix = found
         self._mask = np.zeros(len(detections), dtype=np.bool_)

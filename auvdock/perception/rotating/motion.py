@@ -69,7 +69,7 @@ class CameraMotion:
         if self._euler is None or not 0.0 < step <= _LONGEST_STEP_S:
             euler = sample.euler_zyx_rad.copy()
         else:
-            euler = self._steadied(sample, step)
+            euler = self._steady(sample, step)
         self._euler = euler
         rotation = rotation_from_euler_zyx(*euler.tolist())
         if 0.0 < step <= _LONGEST_STEP_S:
@@ -93,7 +93,7 @@ class CameraMotion:
         u, _, vt = np.linalg.svd((1.0 - share) * a.R_compass_camera + share * b.R_compass_camera)
         return CameraPlace(time_s, u @ vt, (1.0 - share) * a.place_m + share * b.place_m)
 
-    def _steadied(self, sample: Proprioception, step: float) -> Array:
+    def _steady(self, sample: Proprioception, step: float) -> Array:
         assert self._euler is not None
         roll, pitch, _ = self._euler.tolist()
         p, q, r = sample.angular_velocity_rad_s.tolist()

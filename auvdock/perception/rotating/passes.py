@@ -45,14 +45,13 @@ class PassFinder:
         self._frame_rad = self._omega / frame_rate_hz
         self._frames = frame_rate_hz * (self._turn_s - 2.0 * self._window_s)
 
-    def judge(self, candidate: Candidate, now_s: float, motion: CameraMotion, expected_s: float | None) -> Pass | None:
+    def judge(self, candidate: Candidate, now_s: float, motion: CameraMotion) -> Pass | None:
         """A pass that has just ended, if there is one.
 
         Args:
             candidate: the light.
             now_s: time of this frame.
             motion: the camera's motion.
-            expected_s: where a pass is awaited, its time; a pass elsewhere is then none.
         """
         recent = self._recent(candidate, now_s)
         if recent is None:
@@ -70,9 +69,7 @@ class PassFinder:
         if since < self._window_s and float(flux[-1]) - steady > _FAINT * height:
             return None  # still bright: the pass goes on
         candidate.judged_s = float(times[peak]) + self._window_s
-        if expected_s is not None and abs(float(times[peak]) - expected_s) > self._window_s:
-            return None
-        return self._fitted(candidate, first, times, flux - steady, seen, peak, scatter, covered, motion)
+        return self._fit(candidate, first, times, flux - steady, seen, peak, scatter, covered, motion)
 
     def _recent(self, candidate: Candidate, now_s: float) -> tuple[int, int] | None:
         """First sample of the window and the brightest one in it, once that is old enough to be judged."""
@@ -110,7 +107,7 @@ class PassFinder:
         gap = self._omega * max(left, right) - self._frame_rad
         return gap if gap > 0.5 * self._frame_rad else 0.0
 
-    def _fitted(
+    def _fit(
         self,
         candidate: Candidate,
         first: int,
