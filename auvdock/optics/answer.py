@@ -1,4 +1,4 @@
-"""A detector's answer to the lights of one frame, compiled: which it tells apart, which it finds, what it sees besides."""
+"""A detector's answer to the lights of one frame, compiled: what it tells apart, finds and sees besides."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Answer(NamedTuple):
     """What a detector finds, brightest first.
 
     Attributes:
-        index: (k,) which of the lights.
+        which: (k,) index of the light.
         centre: (k, 2) pixels.
         xyxy: (k, 4) boxes.
         score: (k,) between 0 and 1.
@@ -54,7 +54,7 @@ class Answer(NamedTuple):
         veiled: how many of them are veiled by their surroundings.
     """
 
-    index: IntArray
+    which: IntArray
     centre: Array
     xyxy: Array
     score: Array
@@ -125,7 +125,7 @@ def count_veiled(lights: Records[Candidate]) -> int:
 
 @compiled
 def merge(lights: Records[Candidate], distance2: Array, law: Records[DetectionLaw]) -> None:
-    """Make one of lights (m,) too near each other (m, m) to be told apart, in place; see `detection_model.merge_close`."""
+    """Make one of those lights (m,) that are too near (m, m) to be told apart, in place, as `merge_close` says."""
     count = len(lights)
     lead = np.arange(count)
     alone = True

@@ -1,6 +1,7 @@
-"""What each lamp sends into a camera and where on the sensor it falls, compiled: `arrive`, the first half of light's way.
+"""What each lamp sends into a camera and where on the sensor it falls, compiled: the first half of light's way.
 
-The second half, from the sensor to the detector, is `optics.spread` and `optics.meeting`; nuisances come in between.
+Nuisances change what arrives (`optics.view`). In the second half it spreads over the sensor (`optics.spread`), and the
+lights meet (`optics.meeting`).
 """
 
 from __future__ import annotations
@@ -98,9 +99,9 @@ def arrive(
     T_station_camera: Array, lamps: Records[Lamp], rim: Records[Rim], projection: Records[Projection]
 ) -> Records[Arrival]:
     """The light of lamps (n,) at a camera pose (4, 4); `rim` and `projection` have one row."""
-    arrivals = np.empty(len(lamps), dtype=_ARRIVAL)
-    _fill(arrivals, T_station_camera, lamps, rim[0], projection[0])  # type: ignore[arg-type]  # it holds records
-    return arrivals  # type: ignore[return-value]
+    arrivals: Records[Arrival] = np.empty(len(lamps), dtype=_ARRIVAL)  # type: ignore[assignment]  # of records
+    _fill(arrivals, T_station_camera, lamps, rim[0], projection[0])
+    return arrivals
 
 
 @compiled
@@ -109,10 +110,10 @@ def arrive_everywhere(
 ) -> Records[Arrival]:
     """(m n,) the light of lamps (n,) at camera poses (m, 4, 4), pose by pose: `arrive` for planners."""
     count = len(lamps)
-    arrivals = np.empty(len(T_station_camera) * count, dtype=_ARRIVAL)
+    arrivals: Records[Arrival] = np.empty(len(T_station_camera) * count, dtype=_ARRIVAL)  # type: ignore[assignment]  # of records
     for k in range(len(T_station_camera)):
-        _fill(arrivals[k * count : (k + 1) * count], T_station_camera[k], lamps, rim[0], projection[0])  # type: ignore[arg-type]
-    return arrivals  # type: ignore[return-value]
+        _fill(arrivals[k * count : (k + 1) * count], T_station_camera[k], lamps, rim[0], projection[0])
+    return arrivals
 
 
 @compiled

@@ -25,8 +25,7 @@ from scipy.special import j0, j1
 
 from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
-from auvdock.optics.halo import halo_of
-from auvdock.optics.water import WaterCfg
+from auvdock.optics.halo import HaloTable
 
 __all__ = ["BeamSpread", "beam_spread"]
 
@@ -44,11 +43,11 @@ class BeamSpread:
     Beyond b r = 40 the table's last row is kept; between its angles and rows it is linear in the logarithms.
     """
 
-    def __init__(self, water: WaterCfg, half_angle_rad: float) -> None:
+    def __init__(self, halo: HaloTable, half_angle_rad: float) -> None:
         """Tabulate; some 50 ms.
 
         Args:
-            water: its halo is what a narrow beam spreads to.
+            halo: of the water, what a narrow beam spreads to.
             half_angle_rad: θ_h of the profile f = exp(-ln 2 (θ / θ_h)²).
         """
         self._log_br = np.linspace(math.log(_MIN_BR), math.log(_MAX_BR), _ROWS)
@@ -60,7 +59,6 @@ class BeamSpread:
         beam = math.pi / width * np.exp(-(math.pi**2) * nu**2 / width) * nu * weights
         phase = 2.0 * math.pi * np.outer(nu, angle)
         br = np.exp(self._log_br)
-        halo = halo_of(water)
         spread, slope = np.swapaxes([halo.transfer(float(x), nu) for x in br], 0, 1) / halo.scattered(br)[:, None]
         share = (spread * beam) @ (2.0 * math.pi * j0(phase))
         turned = (slope * beam) @ -j1(phase)
@@ -80,9 +78,9 @@ class BeamSpread:
 
 
 @lru_cache(maxsize=16)
-def beam_spread(water: WaterCfg, half_angle_rad: float) -> BeamSpread:
+def beam_spread(halo: HaloTable, half_angle_rad: float) -> BeamSpread:
     """The table for one beam in one water, made once."""
-    return BeamSpread(water, half_angle_rad)
+    return BeamSpread(halo, half_angle_rad)
 
 
 def _gauss(highest: float) -> tuple[Array, Array]:

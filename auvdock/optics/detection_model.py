@@ -203,19 +203,19 @@ def draw_detections(
     found = answer(seen.lights, seen.distance2_px2, model.law, chance, noise, -1 if flash is None else flash.place)
     rate = model.false_alarms * found.veiled / max(m, 1)
     alarms = rng.poisson(rate) if rate > 0.0 else 0
-    index, centre, xyxy, score, class_id, lights, _ = found
+    which, centre, xyxy, score, class_id, lights, _ = found
     ways = model.flash or _FLASH
-    if flash is not None and flash.place in index:
-        place, light = int(np.flatnonzero(index == flash.place)[0]), Candidate.read(lights, flash.place)
+    if flash is not None and flash.place in which:
+        place, light = int(np.flatnonzero(which == flash.place)[0]), Candidate.read(lights, flash.place)
         half = np.maximum(0.5 * (xyxy[place, 2:] - xyxy[place, :2]), ways.box_scale * flash.half_px)
         spread_px = ways.centre_spread * (10.0 * (light.noise_dn / light.contrast_dn)) * float(half.mean())
         centre[place] += ways.centre_shift * flash.shift_px + spread_px * rng.standard_normal(2)
         xyxy[place, :2], xyxy[place, 2:] = centre[place] - half, centre[place] + half
     flux = None
     if seen.measures_flux:
-        draws = rng.standard_normal((2, len(index)))
-        light_e_s = lights["light_e_s"][index] * np.exp(ways.flux_spread * draws[0])
-        flux = np.maximum(light_e_s + lights["light_noise_e_s"][index] * draws[1], 0.0)
+        draws = rng.standard_normal((2, len(which)))
+        light_e_s = lights["light_e_s"][which] * np.exp(ways.flux_spread * draws[0])
+        flux = np.maximum(light_e_s + lights["light_noise_e_s"][which] * draws[1], 0.0)
     if alarms:
         # About the lights whose haze they are.
         at, shift = rng.integers(0, m, alarms), rng.normal(0.0, _HAZE_PX, (alarms, 2))

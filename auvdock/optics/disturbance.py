@@ -78,7 +78,7 @@ class Mirror:
         """The images are the lights from `first` on; `rng` is the stream of the waves."""
         self._level, self._lens, self._images, self._rng = level, lens, slice(first, None), rng
 
-    def reflect(self, view: View, moment: Moment) -> View:  # noqa: ARG002 - waves are drawn anew in each frame
+    def reflect(self, view: View, moment: Moment) -> View:
         """A step: weaken the mirror images and move them."""
         images = view.arrivals[self._images]
         rays = images["ray_camera"].copy()

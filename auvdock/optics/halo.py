@@ -1,7 +1,7 @@
 """The halo: small-angle scattering point spread function of Wells (1973).
 
-Whoever asks how much scattered light arrives, and from where, asks `halo_of`: renderer, `beacons` fidelity, the rotating
-beacon and planners. Only that it holds 1 - e^{-b r} of what absorption leaves is known to `arrival.arrive` as well.
+Whoever asks how much scattered light arrives, and from where, asks `halo_of`: renderer, `beacons` fidelity, rotating
+beacon and planners. Only that it holds 1 - e^{-b r} of what absorption leaves is known to `optics.arrival` as well.
 
 Wells' optical transfer function of a path r is e^{-(a+b) r} e^{b r F(ψ)} with F = (1 - e^{-k}) / k, k = 2π θ0 ψ and ψ
 in cycles per radian. Without its unscattered part it is e^{-a r} × e^{-b r} (e^{b r F} - 1).
@@ -75,7 +75,9 @@ class HaloTable:
         """Optical transfer function (m,) at frequencies (m,), and its derivative by the frequency."""
         k = 2.0 * math.pi * self.theta0_rad * frequency_cycles_rad
         mean = -np.expm1(-k) / k
-        slope = 2.0 * math.pi * self.theta0_rad * br * np.exp(br * (mean - 1.0)) * (k * np.exp(-k) + np.expm1(-k)) / k**2
+        slope = (
+            2.0 * math.pi * self.theta0_rad * br * np.exp(br * (mean - 1.0)) * (k * np.exp(-k) + np.expm1(-k)) / k**2
+        )
         return wells_transfer(br, frequency_cycles_rad, self.theta0_rad), slope
 
     def row_of(self, br: Array) -> tuple[IntArray, Array]:

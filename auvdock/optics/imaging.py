@@ -69,8 +69,8 @@ class UnderwaterCamera:
 
         Args:
             setup: camera, water and lights.
-            scene: owner of the MuJoCo model whose static geoms are drawn, but for one named `TAG_GEOM` in place of which
-                the tag is drawn; without it only lights and tag are.
+            scene: owner of the MuJoCo model whose static geoms are drawn, except one named `TAG_GEOM` where there is a
+                tag; without it only lights and tag are.
 
         Raises:
             ConfigError: a dead light that the station does not have.

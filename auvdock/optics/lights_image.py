@@ -128,7 +128,7 @@ class LightsImage:
         per_e = self._most_channel[index] * exposure_s * self._lens.rad_per_px**2
         shown = np.flatnonzero(light * halos["level"] * per_e > _LEAST_E)
         lamps = _Smooth.zeros(len(shown))
-        lamps["halo"], lamps["light_w_m2"] = halos[shown], light[shown].astype(np.float32)  # type: ignore[index]
+        lamps["halo"], lamps["light_w_m2"] = halos[shown], light[shown].astype(np.float32)  # type: ignore[index]  # some rows
         lamps["ray_camera"], lamps["colour"] = arrivals["ray_camera"][index[shown]], self._colour_of[index[shown]]
         radiance = np.zeros((len(self._colours), self._rays.shape[1]), dtype=np.float32)
         _add_smooth(radiance, self._rays, lamps, self._table)

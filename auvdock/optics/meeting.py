@@ -1,4 +1,4 @@
-"""Lights beside each other on the sensor, compiled: how each stands out from the others and from what is behind them."""
+"""Lights beside each other on the sensor, compiled: how each stands out from the others and what is behind."""
 
 from __future__ import annotations
 
@@ -13,7 +13,17 @@ from auvdock.numeric.compiled import compiled
 from auvdock.numeric.records import Record, Records
 from auvdock.optics.spread import Ring, Spot, SpreadLaw
 
-__all__ = ["Candidate", "CodeScale", "Meeting", "codes", "level_at", "meet", "noise_dn", "saturate", "squared_distances"]
+__all__ = [
+    "Candidate",
+    "CodeScale",
+    "Meeting",
+    "codes",
+    "level_at",
+    "meet",
+    "noise_dn",
+    "saturate",
+    "squared_distances",
+]
 
 
 @dataclass(frozen=True)
@@ -95,7 +105,7 @@ def meet(
         behind_e_s: (3,) electrons per second and pixel behind the lights: red, green, blue.
         exposure_s: exposure time.
     """
-    lights = np.zeros(len(rows), dtype=_CANDIDATE)
+    lights: Records[Candidate] = np.zeros(len(rows), dtype=_CANDIDATE)  # type: ignore[assignment]  # of records
     distance2 = squared_distances(rows)
     level = level_at(profile, distance2, law)
     total, per_level = 0.0, 2.5 / (scale[0].saturated_e / exposure_s)
@@ -119,7 +129,7 @@ def meet(
         light.noise_dn = _noise_dn(own + around, scale[0])
         light.radius_px, light.width_px = math.sqrt(greatest / math.pi), rows[i].sigma_px
         light.flux, light.red = own, best == 0
-    return Meeting(lights, distance2, total)  # type: ignore[arg-type]  # `lights` are records
+    return Meeting(lights, distance2, total)
 
 
 @compiled

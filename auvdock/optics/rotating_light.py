@@ -66,8 +66,8 @@ class RotatingLight:
         self._index = np.array([lamp] if image is None else [lamp, image])
         self._flip = np.array([[1.0, 1.0, 1.0], [1.0, 1.0, -1.0]])[: len(self._index)]
         half = math.radians(cfg.divergence_deg) / 2.0
-        self._spread = beam_spread(water, half)
         self._halo = halo_of(water)
+        self._spread = beam_spread(self._halo, half)
         self._theta0 = water.scattering_angle_rad
         self._sigma = half / math.sqrt(2.0 * math.log(2.0))
         self._near2 = 2.0 / math.pi * self._sigma**2

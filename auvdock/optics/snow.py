@@ -48,7 +48,7 @@ class MarineSnow:
         diameter = self._level.diameter_m * rng.lognormal(0.0, 0.4, count)
         self._areas = math.pi / 4.0 * diameter**2
 
-    def drift(self, view: View, moment: Moment) -> View:  # noqa: ARG002 - they are at rest at all times
+    def drift(self, view: View, moment: Moment) -> View:
         """A step: the brightest flakes that the camera sees, if there is one."""
         relative = self.places_m - view.T_world_camera[:3, 3]
         relative -= np.round(relative / _BOX_M) * _BOX_M

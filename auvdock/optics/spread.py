@@ -107,7 +107,8 @@ def spread(
         rings: (k,) radii.
         halo: (h, k) halo of unit light per pixel at the rings, by b r.
     """
-    rows, profile = np.empty(len(index), dtype=_SPOT), np.empty((len(index), len(rings)))
+    rows: Records[Spot] = np.empty(len(index), dtype=_SPOT)  # type: ignore[assignment]  # of records
+    profile = np.empty((len(index), len(rings)))
     for i in range(len(index)):
         light = index[i]
         arrival, row = arrivals[light], rows[i]
@@ -117,7 +118,7 @@ def spread(
         for c in range(3):
             row.channel[c] = lamps[light].electrons_per_j[c] * law[0].aperture_m2
         row.sigma_px = _put_profile(profile[i], arrival, law[0], rings, halo)
-    return Spread(rows, profile)  # type: ignore[arg-type]  # `rows` are records
+    return Spread(rows, profile)
 
 
 @compiled

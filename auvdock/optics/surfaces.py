@@ -119,9 +119,7 @@ class Surfaces:
             irradiance = irradiance + self._lit.lamp.brightest(height) * through
         return irradiance * _GREATEST_RADIANCE
 
-    def electrons(
-        self, T_world_camera: Array, exposure_s: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def electrons(self, T_world_camera: Array, exposure_s: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Electrons (h, w, 3) per image pixel, red, green, blue, at this resolution, and distances as `radiance` gives.
 
         Raises:
