@@ -121,7 +121,7 @@ def locate(rays: Array, projection: Records[Projection]) -> tuple[Array, BoolArr
     """Pixels (n, 2) of rays (n, 3) in the camera frame, and whether each lies on the sensor (n,)."""
     pixels, inside = np.empty((len(rays), 2)), np.empty(len(rays), dtype=np.bool_)
     for i in range(len(rays)):
-        inside[i] = _locate(rays[i], projection[0], pixels[i])
+        pixels[i, 0], pixels[i, 1], inside[i] = _locate(rays[i, 0], rays[i, 1], rays[i, 2], projection[0])
     return pixels, inside
 
 
@@ -151,7 +151,7 @@ def _fill(
             ray[k] = 0.0
             for axis in range(3):
                 ray[k] += offset[axis] / r * T_station_camera[axis, k]
-        arrival.inside = _locate(ray, projection, arrival.pixel)
+        arrival.pixel[0], arrival.pixel[1], arrival.inside = _locate(ray[0], ray[1], ray[2], projection)
 
 
 @compiled
@@ -167,19 +167,17 @@ def _is_hidden(lamp: Lamp, T_station_camera: Array, rim: Rim) -> bool:
 
 
 @compiled
-def _locate(ray: Array, projection: Projection, pixel: Array) -> bool:
-    """Put the pixel (2,) of a ray (3,) there; whether it lies on the sensor."""
-    brown = projection.brown
-    depth = max(ray[2], 1e-9)
-    x, y = ray[0] / depth, ray[1] / depth
+def _locate(right: float, down: float, ahead: float, projection: Projection) -> tuple[float, float, bool]:
+    """Pixel u, v of a ray, and whether it lies on the sensor."""
+    brown, middle, reach = projection.brown, projection.middle_px, projection.reach_px
+    depth = max(ahead, 1e-9)
+    x, y = right / depth, down / depth
     r2 = x * x + y * y
-    seen = r2 <= projection.max_tangent2 and ray[2] > 0.0
+    seen = r2 <= projection.max_tangent2 and ahead > 0.0
     if projection.tangential:
         u, v = pixel_of(x, y, brown) if seen else (brown[CX], brown[CY])
     else:
         # Without tangential terms there is less to compute, and rays just off the sensor keep their direction.
         stretch = radial_factor(min(r2, projection.max_tangent2), brown[K1], brown[K2], brown[K3])
         u, v = brown[FX] * stretch * x + brown[CX], brown[FY] * stretch * y + brown[CY]
-    pixel[0], pixel[1] = u, v
-    middle, reach = projection.middle_px, projection.reach_px
-    return seen and abs(u - middle[0]) < reach[0] and abs(v - middle[1]) < reach[1]
+    return u, v, seen and abs(u - middle[0]) < reach[0] and abs(v - middle[1]) < reach[1]

@@ -123,7 +123,8 @@ class RotatingLight:
         phi = edge[:-1, None] + step[:, None] * (np.arange(_NODES) + 0.5)
         opening = np.sin(apart + phi)
         s, d = r * np.sin(phi) / opening, r * math.sin(apart) / opening
-        excess = wide_angle_phase(apart + phi, self._theta0) * np.exp(-self._a * (s + d))
+        phase = wide_angle_phase((apart + phi).ravel(), self._theta0).reshape(phi.shape)
+        excess = phase * np.exp(-self._a * (s + d))
         light = self._flux * self._b / (r * math.sin(apart)) * excess.sum(axis=1) * step
         lead = float(self._spread.lead_rad(np.array([self._b * r]), np.array([angle]))[0])
         # One turn stands out only beyond what many small ones make, some θ0 b r / 2; within, the halo stays a whole.
