@@ -30,7 +30,7 @@ __all__ = ["LandingSensor", "landing_share", "load_landing_detection_model"]
 
 
 class LandingSensor:
-    """Gives what the detectors would give, from the same lamps, water, faults and exposure law as `LandingCamera`."""
+    """Gives what the detectors would give, from the same lamps, water, faults and exposure law as the renderer."""
 
     def __init__(
         self,
