@@ -22,8 +22,8 @@ from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
 from auvdock.envs.vehicle_world import Start, VehicleWorld
 from auvdock.optics.detection_model import DetectionModelCfg
 from auvdock.optics.imaging import UnderwaterCamera
-from auvdock.optics.landing_camera import LandingCamera
 from auvdock.optics.landing_sensing import LandingSensor
+from auvdock.optics.setup import OpticalSetup
 from auvdock.sim.truth import Truth
 
 __all__ = ["LandingWorld", "belly_camera", "draw_landing_start"]
@@ -60,25 +60,27 @@ class LandingWorld(VehicleWorld):
         """
         super().__init__(cfg, cfg.station, lambda vehicle: belly_camera(cfg.camera, vehicle))
         self.cfg = cfg
-        optics = (
+        optics = OpticalSetup(
             self.camera,
             self.water,
-            cfg.station,
-            cfg.nuisance,
-            cfg.imaging,
-            cfg.lamp,
-            cfg.faults,
+            cfg.station.layout,
             self.simulator.T_world_station,
+            cfg.imaging,
+            cfg.nuisance,
+            lamp=cfg.lamp,
+            tag=cfg.station.tag,
+            faults=cfg.faults,
+            seen_from="above",
         )
         with located("world.faults."):
-            self.imager = LandingCamera(*optics, scene=self.simulator)
+            self.imager = UnderwaterCamera(optics, self.simulator)
         self._sensor: LandingSensor | None = None
         if cfg.fidelity == "beacons":
             path = cfg.detection_model
             model = None if path is None else load_toml(DetectionModelCfg, Path(path))
             with located("perception."):
                 self._sensor = LandingSensor(
-                    *optics, detector_name=detector, tag_detector_name=tag_detector, model=model
+                    optics, cfg.station, detector_name=detector, tag_detector_name=tag_detector, model=model
                 )
 
     def _draw_start(self, rng: np.random.Generator) -> Start:

@@ -16,6 +16,7 @@ from auvdock.envs.config import StartCfg, WorldCfg
 from auvdock.envs.vehicle_world import Start, VehicleWorld, detection_model, mounted_camera
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.sensing import BeaconSensor
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.station_clock import StationClock
 from auvdock.sim.truth import Truth
 
@@ -56,22 +57,23 @@ class DockingWorld(VehicleWorld):
         self.cfg = cfg
         self._clock: StationClock | None = None
         self._loss_rng = np.random.default_rng(0)
-        self._optics = (
+        self._optics = OpticalSetup(
             self.camera,
             self.water,
             BeaconLayout(cfg.station.layout.beacons + cfg.extra_lights),
-            cfg.nuisance,
-            cfg.imaging,
             self.simulator.T_world_station,
+            cfg.imaging,
+            cfg.nuisance,
+            cfg.station.rotating,
         )
         self._beacon_sensor: BeaconSensor | None = None
         if model is not None:
-            self._beacon_sensor = BeaconSensor(*self._optics, detector, model=model, rotating=cfg.station.rotating)
+            self._beacon_sensor = BeaconSensor(self._optics, model=model)
 
     @cached_property
     def imager(self) -> UnderwaterCamera:
         """The camera that renders; made when first asked for, since the `beacons` fidelity does without."""
-        return UnderwaterCamera(*self._optics, scene=self.simulator, rotating=self.cfg.station.rotating)
+        return UnderwaterCamera(self._optics, self.simulator)
 
     def _draw_start(self, rng: np.random.Generator) -> Start:
         position_m, quat_wxyz = draw_start(self.cfg.start, self.cfg.station.depth_m, rng)

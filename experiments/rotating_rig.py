@@ -14,6 +14,7 @@ halos of 50 m. And how sensitive the camera is: `MAX_GAIN`.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ from auvdock.core.transforms import make_transform
 from auvdock.optics.imaging import ImagingCfg, Shot, UnderwaterCamera
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.settings import ExposureCfg
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import WaterCfg, load_water
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
@@ -101,15 +103,15 @@ class PoolRig:
             self.camera_cfg, np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
         )
         self.imager = UnderwaterCamera(
-            self.camera,
-            water if water is not None else load_water("pool"),
-            self.layout,
-            NuisanceCfg(
-                parts.flicker, parts.marine_snow, parts.interfering_lights, parts.surface_reflection, daylight=level
-            ),
-            ImagingCfg(surfaces=False, exposure=ExposureCfg(max_gain=MAX_GAIN)),
-            make_transform(np.eye(3), np.array([0.0, 0.0, -DEPTH_M])),
-            rotating=self.beacon,
+            OpticalSetup(
+                self.camera,
+                water if water is not None else load_water("pool"),
+                self.layout,
+                make_transform(np.eye(3), np.array([0.0, 0.0, -DEPTH_M])),
+                ImagingCfg(surfaces=False, exposure=ExposureCfg(max_gain=MAX_GAIN)),
+                dataclasses.replace(parts, daylight=level),
+                self.beacon,
+            )
         )
 
     def azimuth_rad(self, x_m: float, y_m: float) -> float:

@@ -17,6 +17,7 @@ from auvdock.experiments.rotating_rig import DEPTH_M, FLUX_DISC_RAD, NETWORK_PX,
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.sensing import BeaconSensor
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.station_clock import StationClock
 from auvdock.optics.water import load_water
 from auvdock.perception.rotating.algorithm_2 import ForwardDetection, PaperBCfg, PaperBForwardBeacon
@@ -243,15 +244,16 @@ def _beacons(
     """Detections without an image, for the network's own image size."""
     height_px = round(NETWORK_PX * rig.camera_cfg.height_px / rig.camera_cfg.width_px)
     small = PoolRig(place.day, camera=CameraCfg(NETWORK_PX, height_px), lamps=scenario.lamps)
-    sensor = BeaconSensor(
+    setup = OpticalSetup(
         small.camera,
         load_water("pool"),
         small.layout,
-        NuisanceCfg(daylight="mild" if place.day else "none"),
-        ImagingCfg(surfaces=False),
         make_transform(np.eye(3), np.array([0.0, 0.0, -DEPTH_M])),
-        rotating=rig.beacon,
+        ImagingCfg(surfaces=False),
+        NuisanceCfg(daylight="mild" if place.day else "none"),
+        rig.beacon,
     )
+    sensor = BeaconSensor(setup)
     sensor.reset(streams[2])
     clock, pose = _clock(scenario, streams[1]), rig.pose(place.x_m, place.y_m)
     facing_s = rig.facing_s(place.x_m, place.y_m)

@@ -19,7 +19,7 @@ from auvdock.numeric.compiled import compiled
 from auvdock.optics.beam_pieces import BeamPieces, PieceLight
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet
-from auvdock.optics.rotating_light import Beam
+from auvdock.optics.view import Beam
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeamImage"]
@@ -52,7 +52,7 @@ class BeamImage:
         self._few = np.ascontiguousarray(few.T)
         self._solid_angle = lens.solid_angle_sr.astype(np.float32)
         self._pixel_sr = lens.rad_per_px**2
-        self._channel = lights.electrons_per_j[lamp] * lens.aperture_m2
+        self._channel = lights.column("electrons_per_j")[lamp] * lens.aperture_m2
 
     def add(self, image: NDArray[np.float32], beam: Beam, exposure_s: float) -> None:
         """Add electrons per image pixel of the beam to the coarse grid (h, w, 3)."""

@@ -1,6 +1,6 @@
 """How the light of a beam's pieces spreads about them, for the renderer and for the `beacons` fidelity alike.
 
-A piece sends unscattered light, which shows the beam as it is, and scattered light, which spreads by Wells' function
+A piece sends unscattered light, which shows the beam as it is, and scattered light, which spreads as the halo
 smoothed over the piece's size s. With w the halo within s of a point, a share w² is a Gaussian of this size, for a halo
 that is narrower than the piece, and the rest is (1 + w) h(√(θ² + s²)), for one that is broader; together they hold what
 h holds. A beam that is wider than its piece is long has no direction left to show: its unscattered light is a Gaussian
@@ -17,8 +17,8 @@ import numpy as np
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import LEAST_EXPONENT
-from auvdock.optics.halo import halo_table
-from auvdock.optics.rotating_light import Beam
+from auvdock.optics.halo import halo_of
+from auvdock.optics.view import Beam
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeamPieces", "PieceLight"]
@@ -54,10 +54,10 @@ class BeamPieces:
         """Tabulate the halo.
 
         Args:
-            water: gives Wells' θ0.
+            water: gives the halo.
             least_rad: least size of a piece's Gaussian.
         """
-        self._table = halo_table(water.scattering_angle_rad)
+        self._table = halo_of(water)
         self._first, self._last = math.log(_FIRST_RAD), math.log(math.pi)
         self._per_step = (_ANGLES - 1) / (self._last - self._first)
         grid = np.exp(np.linspace(self._first, self._last, _ANGLES))
@@ -74,7 +74,7 @@ class BeamPieces:
         low = self._encircled[row, column] * (1.0 - right) + self._encircled[row, column + 1] * right
         high = self._encircled[row + 1, column] * (1.0 - right) + self._encircled[row + 1, column + 1] * right
         within = low * (1.0 - weight) + high * weight
-        scattered = -np.expm1(-beam.scattering_depth)
+        scattered = self._table.scattered(beam.scattering_depth)
         ribbon = (1.0 - scattered) / (1.0 + (beam.width_rad / length) ** 4)
         blob = 1.0 - scattered - ribbon + scattered * within**2
         rows = self._log_rows[row] * (1.0 - weight[:, None]) + self._log_rows[row + 1] * weight[:, None]

@@ -25,7 +25,7 @@ from scipy.special import j0, j1
 
 from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
-from auvdock.optics.halo import wells_transfer
+from auvdock.optics.halo import HaloTable
 
 __all__ = ["BeamSpread", "beam_spread"]
 
@@ -43,11 +43,11 @@ class BeamSpread:
     Beyond b r = 40 the table's last row is kept; between its angles and rows it is linear in the logarithms.
     """
 
-    def __init__(self, theta0_rad: float, half_angle_rad: float) -> None:
+    def __init__(self, halo: HaloTable, half_angle_rad: float) -> None:
         """Tabulate; some 50 ms.
 
         Args:
-            theta0_rad: Wells' θ0 of the water.
+            halo: of the water, what a narrow beam spreads to.
             half_angle_rad: θ_h of the profile f = exp(-ln 2 (θ / θ_h)²).
         """
         self._log_br = np.linspace(math.log(_MIN_BR), math.log(_MAX_BR), _ROWS)
@@ -59,8 +59,7 @@ class BeamSpread:
         beam = math.pi / width * np.exp(-(math.pi**2) * nu**2 / width) * nu * weights
         phase = 2.0 * math.pi * np.outer(nu, angle)
         br = np.exp(self._log_br)
-        spread = np.array([wells_transfer(float(x), nu, theta0_rad) for x in br]) / -np.expm1(-br)[:, None]
-        slope = np.array([_slope(float(x), nu, theta0_rad) for x in br]) / -np.expm1(-br)[:, None]
+        spread, slope = np.swapaxes([halo.transfer(float(x), nu) for x in br], 0, 1) / halo.scattered(br)[:, None]
         share = (spread * beam) @ (2.0 * math.pi * j0(phase))
         turned = (slope * beam) @ -j1(phase)
         self._log_share = np.log(np.maximum(share, 1e-300))
@@ -79,9 +78,9 @@ class BeamSpread:
 
 
 @lru_cache(maxsize=16)
-def beam_spread(theta0_rad: float, half_angle_rad: float) -> BeamSpread:
+def beam_spread(halo: HaloTable, half_angle_rad: float) -> BeamSpread:
     """The table for one beam in one water, made once."""
-    return BeamSpread(theta0_rad, half_angle_rad)
+    return BeamSpread(halo, half_angle_rad)
 
 
 def _gauss(highest: float) -> tuple[Array, Array]:
@@ -91,13 +90,6 @@ def _gauss(highest: float) -> tuple[Array, Array]:
     width = highest / panels
     nu = (np.arange(panels)[:, None] + 0.5 * (nodes + 1.0)) * width
     return nu.ravel(), np.tile(0.5 * width * weights, panels)
-
-
-def _slope(br: float, nu: Array, theta0_rad: float) -> Array:
-    """d/dν of `wells_transfer`."""
-    k = 2.0 * math.pi * theta0_rad * nu
-    mean = -np.expm1(-k) / k
-    return 2.0 * math.pi * theta0_rad * br * np.exp(br * (mean - 1.0)) * (k * np.exp(-k) + np.expm1(-k)) / k**2
 
 
 @compiled

@@ -12,10 +12,12 @@ from scipy.optimize import linear_sum_assignment, minimize
 from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.core.contracts import Detections, Detector
 from auvdock.numeric.constants import HALF_SCORE_SNR
+from auvdock.numeric.records import Records
 from auvdock.optics.detection_model import Candidates, DetectionModelCfg, merge_close, veiled_share
 from auvdock.optics.flash import FlashOptics
 from auvdock.optics.imaging import UnderwaterCamera
-from auvdock.optics.sensing import candidates_in_view
+from auvdock.optics.meeting import Candidate
+from auvdock.optics.sensing import meet
 
 __all__ = ["Observation", "fit_detection_model", "observe"]
 
@@ -50,7 +52,7 @@ def observe(
         imager.reset(rng.spawn(1)[0])
         shot = imager.take(pose, 0.0)
         spots = flash.spots(shot.view)
-        seen, _ = candidates_in_view(imager.lit, shot.view, spots, shot.exposure_s, shot.gain)
+        seen, _ = meet(imager.lit, shot.view, spots, shot.exposure_s, shot.gain)
         observations.append(Observation(seen, detector.detect(shot.frame), size))
     return observations
 
@@ -77,21 +79,21 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
     wrong: list[BoolArray] = []
     alarms = 0
     for item in observations:
-        lights = merge_close(item.seen, merging)
+        lights = merge_close(item.seen, merging).lights
         match = _match(lights, item.found)
-        present = lights.contrast_dn > 0.5
+        present = lights["contrast_dn"] > 0.5
         hit = match >= 0
-        contrast.append(lights.contrast_dn[present])
-        around.append(lights.surround_dn[present])
+        contrast.append(lights["contrast_dn"][present])
+        around.append(lights["surround_dn"][present])
         hits.append(hit[present])
         good = hit & present
         partner = match[good]
-        snr = lights.contrast_dn[good] / lights.noise_dn[good]
-        errors.append(item.found.centre_px[partner] - lights.pixels[good])
-        blur.append(lights.width_px[good] * (100.0 / lights.contrast_dn[good]) ** 2)
+        snr = lights["contrast_dn"][good] / lights["noise_dn"][good]
+        errors.append(item.found.centre_px[partner] - lights["pixel"][good])
+        blur.append(lights["width_px"][good] * (100.0 / lights["contrast_dn"][good]) ** 2)
         score = np.clip(item.found.score[partner], 0.0, 0.999)
         gains.append(HALF_SCORE_SNR * score / (1.0 - score) / snr)
-        wrong.append((item.found.class_id[partner] == 1) != lights.red[good])
+        wrong.append((item.found.class_id[partner] == 1) != lights["red"][good])
         alarms += _unexplained(item)
     c50, factor, slope, ceiling = _fit_curve(np.concatenate(contrast), np.concatenate(around), np.concatenate(hits))
     floor, noise = _fit_spread(np.concatenate(errors), np.concatenate(blur))
@@ -113,14 +115,14 @@ def fit_detection_model(name: str, source: str, observations: list[Observation])
     )
 
 
-def _match(lights: Candidates, found: Detections) -> IntArray:
+def _match(lights: Records[Candidate], found: Detections) -> IntArray:
     """Index (m,) of the detection that belongs to each light, -1 for none; one to one, nearest overall."""
-    match = np.full(len(lights.flux), -1, dtype=np.int64)
+    match = np.full(len(lights), -1, dtype=np.int64)
     if len(found) == 0 or len(match) == 0:
         return match
-    distance = np.linalg.norm(lights.pixels[:, None, :] - found.centre_px[None, :, :], axis=2)
-    allowed = (_NEAR_PX + lights.radius_px)[:, None]
-    cost = np.where((distance < allowed) & (lights.contrast_dn > 0.5)[:, None], distance, 1e6)
+    distance = np.linalg.norm(lights["pixel"][:, None, :] - found.centre_px[None, :, :], axis=2)
+    allowed = (_NEAR_PX + lights["radius_px"])[:, None]
+    cost = np.where((distance < allowed) & (lights["contrast_dn"] > 0.5)[:, None], distance, 1e6)
     rows, columns = linear_sum_assignment(cost)
     for row, column in zip(rows, columns, strict=True):
         if cost[row, column] < 1e6:
@@ -130,10 +132,10 @@ def _match(lights: Candidates, found: Detections) -> IntArray:
 
 def _unexplained(item: Observation) -> int:
     """Number of detections far from every light; at the border, where halos of lights outside reach in, none count."""
-    seen, centre = item.seen, item.found.centre_px
+    seen, centre = item.seen.lights, item.found.centre_px
     inner = np.all((centre > _EDGE_PX) & (centre < np.array(item.size_px) - 1.0 - _EDGE_PX), axis=1)
-    distance = np.linalg.norm(seen.pixels[:, None, :] - centre[None, :, :], axis=2)
-    far = np.all(distance > (3.0 * _NEAR_PX + 2.0 * seen.radius_px)[:, None], axis=0)
+    distance = np.linalg.norm(seen["pixel"][:, None, :] - centre[None, :, :], axis=2)
+    far = np.all(distance > (3.0 * _NEAR_PX + 2.0 * seen["radius_px"])[:, None], axis=0)
     return int(np.count_nonzero(inner & far))
 
 
@@ -142,20 +144,20 @@ def _fit_merging(observations: list[Observation]) -> tuple[float, float]:
     radii: list[float] = []
     apart: list[bool] = []
     for item in observations:
-        seen, found = item.seen, item.found
-        bright = np.flatnonzero(seen.contrast_dn > _BRIGHT_DN)
+        seen, found = item.seen.lights, item.found
+        bright = np.flatnonzero(seen["contrast_dn"] > _BRIGHT_DN)
         if len(bright) < 2 or len(found) == 0:
             continue
-        distance = np.linalg.norm(seen.pixels[:, None, :] - found.centre_px[None, :, :], axis=2)
+        distance = np.linalg.norm(seen["pixel"][:, None, :] - found.centre_px[None, :, :], axis=2)
         nearest = distance.argmin(axis=1)
         for position, i in enumerate(bright):
             for j in bright[position + 1 :]:
-                d = float(np.linalg.norm(seen.pixels[i] - seen.pixels[j]))
+                d = float(np.linalg.norm(seen["pixel"][i] - seen["pixel"][j]))
                 if d > 40.0:
                     continue
                 both = nearest[i] != nearest[j] and distance[i, nearest[i]] < 0.4 * d + 0.5
                 gap.append(d)
-                radii.append(float(seen.radius_px[i] + seen.radius_px[j]))
+                radii.append(float(seen["radius_px"][i] + seen["radius_px"][j]))
                 apart.append(bool(both and distance[j, nearest[j]] < 0.4 * d + 0.5))
     if len(gap) < 10 or all(apart):
         return 2.0, 1.0

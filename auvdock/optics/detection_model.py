@@ -12,20 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.assets import asset
-from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections
 from auvdock.core.limits import NotNegative, Positive, Share
 from auvdock.core.strict import load_toml
-from auvdock.optics.detection_loop import drawn, merge, with_ghosts
-from auvdock.optics.light_loop import close, crowded, veiled
+from auvdock.numeric.records import Records
+from auvdock.optics.answer import DetectionLaw, Ghosts, add_ghosts, answer, count_veiled, merge
+from auvdock.optics.meeting import Candidate
 
 __all__ = [
     "Candidates",
     "DetectionModelCfg",
     "Flash",
     "FlashModelCfg",
-    "draw_among",
     "draw_detections",
     "load_detection_model",
     "merge_close",
@@ -108,13 +108,23 @@ class DetectionModelCfg(Checked):
     """Towards a rotating beacon; None: the defaults of `FlashModelCfg`."""
 
     @cached_property
-    def numbers(self) -> Array:
-        """(12,) what compiled code takes: finding (4), measuring (4), finding a rotating beacon (2), merging (2)."""
+    def law(self) -> Records[DetectionLaw]:
+        """What compiled code takes: one row."""
         ways = self.flash or _FLASH
-        found = self.contrast_50_dn, self.surround_factor, self.slope, self.ceiling
-        measured = self.centre_at_100, self.centre_floor_px, self.score_gain, self.wrong_colour
-        merged = self.merge_px, self.merge_radii
-        return np.array([*found, *measured, ways.contrast_50_dn, ways.slope, *merged])
+        return DetectionLaw(
+            self.contrast_50_dn,
+            self.surround_factor,
+            self.slope,
+            self.ceiling,
+            self.centre_at_100,
+            self.centre_floor_px,
+            self.score_gain,
+            self.wrong_colour,
+            ways.contrast_50_dn,
+            ways.slope,
+            self.merge_px,
+            self.merge_radii,
+        ).packed()
 
 
 class Flash(NamedTuple):
@@ -135,54 +145,16 @@ class Candidates(NamedTuple):
     """Lights on the sensor as a detector meets them.
 
     Attributes:
-        pixels: (m, 2) positions.
-        levels: (6, m) code at the centre above the code of its surroundings, in the light's brightest channel; code of
-            those surroundings; standard deviation of the code there; radius of the saturated disc in px, 0 without one;
-            width of the spot in px; weight of the light in a merged centre. Each row has a name of its own, too.
+        lights: (m,) each of them.
         distance2_px2: (m, m) squared distances between them.
-        red: (m,) whether red is its brightest channel: class `RED` (1), else `BLUE` (0).
         flash: the rotating beacon among them, None if it is not in view.
-        light_e_s: (m,) what a detector measures as flux, photo-electrons per second; None without a rotating beacon.
-        light_noise_e_s: (m,) its standard deviation by shot and read noise.
+        measures_flux: their flux is known, as it is beside a rotating beacon.
     """
 
-    pixels: Array
-    levels: Array
+    lights: Records[Candidate]
     distance2_px2: Array
-    red: BoolArray
     flash: Flash | None = None
-    light_e_s: Array | None = None
-    light_noise_e_s: Array | None = None
-
-    @property
-    def contrast_dn(self) -> Array:
-        """(m,) code at the centre above that of the surroundings."""
-        return self.levels[0]
-
-    @property
-    def surround_dn(self) -> Array:
-        """(m,) code of the surroundings."""
-        return self.levels[1]
-
-    @property
-    def noise_dn(self) -> Array:
-        """(m,) standard deviation of the code at the centre."""
-        return self.levels[2]
-
-    @property
-    def radius_px(self) -> Array:
-        """(m,) radius of the saturated disc."""
-        return self.levels[3]
-
-    @property
-    def width_px(self) -> Array:
-        """(m,) width of the spot."""
-        return self.levels[4]
-
-    @property
-    def flux(self) -> Array:
-        """(m,) weight in a merged centre."""
-        return self.levels[5]
+    measures_flux: bool = False
 
 
 def load_detection_model(name: str) -> DetectionModelCfg:
@@ -205,52 +177,29 @@ def draw_detections(
         size_px: width and height of the image.
         rng: source of the draws.
     """
-    counts = crowded(seen.levels, seen.distance2_px2, model.numbers)
-    return draw_among(seen, counts, model, size_px, rng)
-
-
-def draw_among(
-    seen: Candidates,
-    counts: tuple[int, bool],
-    model: DetectionModelCfg,
-    size_px: tuple[int, int],
-    rng: np.random.Generator,
-) -> Detections:
-    """As `draw_detections`, where it is known how many lights are veiled and whether any two are too close."""
-    (hidden, near), m = counts, len(seen.pixels)
+    m, flash = len(seen.lights), seen.flash
     chance, noise = rng.random((2, m)), rng.standard_normal((m, 2))
-    rate = model.false_alarms * hidden / max(m, 1)
+    found = answer(seen.lights, seen.distance2_px2, model.law, chance, noise, -1 if flash is None else flash.place)
+    rate = model.false_alarms * found.veiled / max(m, 1)
     alarms = rng.poisson(rate) if rate > 0.0 else 0
-    merged = merge_close(seen, model) if near else seen
-    flash, ways = seen.flash, model.flash or _FLASH
-    index, centre, xyxy, score, class_id = drawn(
-        merged.pixels,
-        merged.levels,
-        merged.red,
-        noise,
-        chance,
-        flash.place if flash is not None else -1,
-        model.numbers,
-    )
-    if flash is not None and flash.place in index:
-        place = int(np.flatnonzero(index == flash.place)[0])
+    which, centre, xyxy, score, class_id, lights, _ = found
+    ways = model.flash or _FLASH
+    if flash is not None and flash.place in which:
+        place, light = int(np.flatnonzero(which == flash.place)[0]), Candidate.read(lights, flash.place)
         half = np.maximum(0.5 * (xyxy[place, 2:] - xyxy[place, :2]), ways.box_scale * flash.half_px)
-        noise_over_contrast = 10.0 * float(merged.noise_dn[flash.place] / merged.contrast_dn[flash.place])
-        spread_px = ways.centre_spread * noise_over_contrast * float(half.mean())
+        spread_px = ways.centre_spread * (10.0 * (light.noise_dn / light.contrast_dn)) * float(half.mean())
         centre[place] += ways.centre_shift * flash.shift_px + spread_px * rng.standard_normal(2)
         xyxy[place, :2], xyxy[place, 2:] = centre[place] - half, centre[place] + half
     flux = None
-    if merged.light_e_s is not None and merged.light_noise_e_s is not None:
-        draws = rng.standard_normal((2, len(index)))
-        light = merged.light_e_s[index] * np.exp(ways.flux_spread * draws[0])
-        flux = np.maximum(light + merged.light_noise_e_s[index] * draws[1], 0.0)
+    if seen.measures_flux:
+        draws = rng.standard_normal((2, len(which)))
+        light_e_s = lights["light_e_s"][which] * np.exp(ways.flux_spread * draws[0])
+        flux = np.maximum(light_e_s + lights["light_noise_e_s"][which] * draws[1], 0.0)
     if alarms:
         # About the lights whose haze they are.
         at, shift = rng.integers(0, m, alarms), rng.normal(0.0, _HAZE_PX, (alarms, 2))
-        looks, kinds = rng.uniform(0.2, 0.5, alarms), rng.integers(0, 2, alarms)
-        centre, xyxy, score, class_id = with_ghosts(
-            centre, xyxy, score, class_id, seen.pixels, at, shift, looks, kinds, *size_px
-        )
+        ghosts = Ghosts(at, shift, rng.uniform(0.2, 0.5, alarms), rng.integers(0, 2, alarms))
+        centre, xyxy, score, class_id = add_ghosts(found, ghosts, seen.lights, *size_px)
         if flux is not None:
             flux = np.concatenate([flux, np.full(alarms, _GHOST_FLUX * (float(flux.min()) if len(flux) else 1.0))])
     return Detections(xyxy, centre, score, class_id, flux)
@@ -258,7 +207,7 @@ def draw_among(
 
 def veiled_share(seen: Candidates) -> float:
     """Share of lights whose surroundings outshine their contrast by 50 codes or more."""
-    return veiled(seen.levels) / max(len(seen.pixels), 1)
+    return count_veiled(seen.lights) / max(len(seen.lights), 1)
 
 
 def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
@@ -266,6 +215,6 @@ def merge_close(seen: Candidates, model: DetectionModelCfg) -> Candidates:
 
     Lights that have been merged into another keep their place with contrast 0.
     """
-    pixels, levels = seen.pixels.copy(), seen.levels.copy()
-    merge(pixels, levels, close(seen.distance2_px2, seen.radius_px, model.numbers))
-    return seen._replace(pixels=pixels, levels=levels)
+    lights = seen.lights.copy()
+    merge(lights, seen.distance2_px2, model.law)
+    return seen._replace(lights=lights)

@@ -14,10 +14,10 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.optics.beam_pieces import BeamPieces
 from auvdock.optics.detection_model import Candidates, Flash, FlashModelCfg
-from auvdock.optics.rotating_light import Beam
-from auvdock.optics.scene import LitScene, View
+from auvdock.optics.scene import LitScene
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.spots import FlashLines, Spots
+from auvdock.optics.view import Beam, View
 
 __all__ = ["FlashOptics", "measured_light", "with_flash"]
 
@@ -40,17 +40,18 @@ class FlashOptics:
     def spots(self, view: View) -> Spots:
         """Profiles of the lights in view, the beam counted to its lamp."""
         index = view.inside.nonzero()[0]
-        spots = self._lit.spots.spots(view.received, index)
+        spots = self._lit.spots.spread(view.arrivals, index)
         rotating, beam = self._lit.rotating, view.beam
         if rotating is None or beam is None:
             return spots
         place = np.flatnonzero(index == rotating.lamp)
-        if len(place):
-            spots.flash = self._lines(spots, int(place[0]), beam)
-            # As a spot among others: the mean of the four directions.
-            lines = spots.flash.lines
-            spots.profile[spots.flash.place] = 0.25 * (lines[0] + lines[1]) + 0.5 * lines[2]
-        return spots
+        if len(place) == 0:
+            return spots
+        flash = self._lines(spots, int(place[0]), beam)
+        # As a spot among others: the mean of the four directions.
+        profile, lines = spots.profile.copy(), flash.lines
+        profile[flash.place] = 0.25 * (lines[0] + lines[1]) + 0.5 * lines[2]
+        return spots._replace(profile=profile, flash=flash)
 
     def _lines(self, spots: Spots, k: int, beam: Beam) -> FlashLines:
         rad_per_px, radii = self._lit.lens.rad_per_px, self._lit.spots.radii_px
@@ -83,20 +84,20 @@ def measured_light(lit: LitScene, spots: Spots, seen: Candidates, exposure_s: fl
     radii. Of a saturated spot it extrapolates the halo and misses most of the core: 0.12 + 0.9 of the light beside the
     core remains, from a saturated radius of 2.5 px on (fitted on rendered frames to a fifth).
     """
-    radii, rings = lit.spots.radii_px, lit.spots.ring_px2
+    radii, rings = lit.spots.radii_px, lit.spots.rings["area_px2"]
     disc_px = max(_DISC_RAD / lit.lens.rad_per_px, _MIN_DISC_PX)
     area = math.pi * disc_px**2
     inner = rings * (radii < disc_px)
     inner *= area / inner.sum()
     around = rings * ((radii > 1.4 * disc_px) & (radii < 2.0 * disc_px))
     around *= area / around.sum()
-    channel = spots.channel.max(axis=1)
+    channel = spots.rows["channel"].max(axis=1)
     level = np.maximum(spots.profile @ (inner - around) * channel, 1e-30)
     total_e = spots.profile @ (inner + around) * channel * exposure_s
     ring_px2 = math.pi * disc_px**2 * (2.0**2 - 1.4**2)
-    noise = np.sqrt(total_e + lit.cfg.read_noise_e**2 * area * (1.0 + area / ring_px2)) / exposure_s
-    beside = 1.0 - np.minimum(spots.core * channel / level, 1.0)
-    burnt = np.clip((seen.radius_px - 1.0) / 1.5, 0.0, 1.0)
+    noise = np.sqrt(total_e + lit.setup.imaging.read_noise_e**2 * area * (1.0 + area / ring_px2)) / exposure_s
+    beside = 1.0 - np.minimum(spots.rows["core_w_m2"] * channel / level, 1.0)
+    burnt = np.clip((seen.lights["radius_px"] - 1.0) / 1.5, 0.0, 1.0)
     return level * np.minimum(0.12 + 0.9 * beside, 1.0) ** burnt, noise
 
 
@@ -116,28 +117,28 @@ def with_flash(
     light, noise = measured_light(lit, spots, seen, exposure_s)
     lines = spots.flash
     if lines is None:
-        return seen._replace(light_e_s=light, light_noise_e_s=noise)
+        return _with_flux(seen, light, noise)
     k = lines.place
-    electrons_s = spots.channel.max(axis=1)
+    electrons_s = spots.rows["channel"].max(axis=1)
     # The others' light where the detector sees background: on a circle about the flash.
-    others = lit.spots.at_distance(spots, seen.distance2_px2 + ways.background_px**2)[k] * electrons_s
+    others = lit.spots.level_at(spots, seen.distance2_px2 + ways.background_px**2)[k] * electrons_s
     around_e = float(others.sum() - others[k]) * exposure_s
     top = _top(lines, electrons_s[k] * exposure_s, around_e, lit.spots.radii_px, scale, ways)
     flash, contrast_dn, background_dn = top
-    levels, pixels = seen.levels.copy(), seen.pixels.copy()
-    contrast, surround = levels[0], levels[1]
+    lights = seen.lights.copy()
+    contrast, pixels = lights["contrast_dn"], lights["pixel"]
     # To a detector the flash and what lies within it are one light; so are a bright light and a flash within that.
-    reach_px = np.maximum(float(np.mean(flash.half_px)), 2.0 * seen.radius_px)
+    reach_px = np.maximum(float(np.mean(flash.half_px)), 2.0 * lights["radius_px"])
     part = seen.distance2_px2[k] < reach_px**2
     part[k] = True
     members = np.flatnonzero(part)
-    lead = int(members[np.argmax(seen.flux[members])])
-    if lead == k or 2.0 * seen.surround_dn[k] < seen.contrast_dn[k]:
+    lead = int(members[np.argmax(lights["flux"][members])])
+    if lead == k or 2.0 * lights["surround_dn"][k] < contrast[k]:
         contrast[k] = contrast_dn
     else:
         # It stands on the slope of another's halo.
         contrast[k] = min(contrast_dn, float(contrast[k]))
-    surround[k] = background_dn
+    lights["surround_dn"][k] = background_dn
     weight = light[members]
     if len(members) > 1 and weight.sum() > 0.0:
         pixels[lead] = weight @ pixels[members] / weight.sum()
@@ -146,7 +147,13 @@ def with_flash(
         if contrast[lead] < contrast_dn:
             contrast[lead] = contrast_dn
             flash = flash._replace(place=lead)
-    return seen._replace(pixels=pixels, levels=levels, flash=flash, light_e_s=light, light_noise_e_s=noise)
+    return _with_flux(seen._replace(lights=lights, flash=flash), light, noise)
+
+
+def _with_flux(seen: Candidates, light_e_s: Array, noise_e_s: Array) -> Candidates:
+    lights = seen.lights.copy()
+    lights["light_e_s"], lights["light_noise_e_s"] = light_e_s, noise_e_s
+    return seen._replace(lights=lights, measures_flux=True)
 
 
 def _top(

@@ -74,7 +74,7 @@ class StaticRenderer:
             GraphicsError: no OpenGL context can be had here, or it is at work in another thread; the message says what
                 to install or to do.
         """
-        offscreen, scene = self._drawn_by()
+        offscreen, scene = self.drawn_by()
         for camera in scene.camera:
             camera.pos[:] = T_world_camera[:3, 3]
             camera.forward[:] = T_world_camera[:3, 2]
@@ -98,9 +98,14 @@ class StaticRenderer:
         Raises:
             GraphicsError: no OpenGL context can be had here; the message says what to install or to do.
         """
-        return self._drawn_by()[0].name
+        return self.drawn_by()[0].name
 
-    def _drawn_by(self) -> tuple[Offscreen, Any]:
+    def drawn_by(self) -> tuple[Offscreen, Any]:
+        """The context and MuJoCo's scene in it; made when first asked for in a process.
+
+        Raises:
+            GraphicsError: no OpenGL context can be had here.
+        """
         if self._offscreen is None or not self._offscreen.is_ours:
             self._offscreen = Offscreen(self._model, *self._size, coarse=True)
             self._scene = self._static_scene()

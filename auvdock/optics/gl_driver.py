@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 from auvdock.core.errors import GraphicsError
 from auvdock.sim.mj import GL_REFUSAL
 
-__all__ = ["new_context", "renderer_name"]
+__all__ = ["Driver", "after_fork", "new_context", "renderer_name"]
 
 _T = TypeVar("_T")
 _WITHOUT = "or run without images: --fidelity beacons"
@@ -41,7 +41,7 @@ _WITHOUT_THREADS = ("llvmpipe", "softpipe")
 
 
 @dataclass
-class _Driver:
+class Driver:
     """What happened to this process's driver.
 
     Attributes:
@@ -55,7 +55,7 @@ class _Driver:
     lost: bool = False
 
 
-_driver = _Driver()
+_driver = Driver()
 
 
 def new_context(width_px: int, height_px: int, use: Callable[[], _T]) -> tuple[Any, _T]:
@@ -146,7 +146,7 @@ def _egl_started() -> bool:
     return getattr(sys.modules.get("mujoco.egl"), "EGL_DISPLAY", None) is not None
 
 
-def _after_fork() -> None:
+def after_fork() -> None:
     """In the new process: whether the driver can still be used, and that its end is the parent's business."""
     _driver.lost |= _driver.windowed or (_egl_started() and not _driver.forkable)
     if (end := getattr(sys.modules.get("mujoco.egl"), "_terminate_display", None)) is not None:
@@ -154,4 +154,4 @@ def _after_fork() -> None:
 
 
 if hasattr(os, "register_at_fork"):  # POSIX; elsewhere there is no fork
-    os.register_at_fork(after_in_child=_after_fork)
+    os.register_at_fork(after_in_child=after_fork)

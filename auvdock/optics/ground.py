@@ -36,14 +36,14 @@ class Ground:
         """(n, 3) electrons per second and pixel of what a grid of rays meets, red, green, blue."""
         lit = self._scene.lit
         station = self._station
-        to_station = lit.T_world_station[:3, :3].T
+        to_station = lit.setup.T_world_station[:3, :3].T
         rays = self._rays @ T_world_camera[:3, :3].T
         origin = T_world_camera[:3, 3]
-        down = np.minimum(rays @ lit.T_world_station[:3, 2], -1e-3)
+        down = np.minimum(rays @ lit.setup.T_world_station[:3, 2], -1e-3)
         height = self._scene.height_m(T_world_camera)
         reach = height / -down
         points = origin + rays * reach[:, None]
-        local = (points - lit.T_world_station[:3, 3]) @ to_station.T
+        local = (points - lit.setup.T_world_station[:3, 3]) @ to_station.T
         beside = (np.abs(local[:, 0]) > 0.5 * station.length_m) | (np.abs(local[:, 1]) > 0.5 * station.width_m)
         reach = np.where(beside, (height + station.height_m) / -down, reach)
         points = origin + rays * np.minimum(reach, 80.0)[:, None]

@@ -1,5 +1,8 @@
 """The halo: small-angle scattering point spread function of Wells (1973).
 
+Whoever asks how much scattered light arrives, and from where, asks `halo_of`: renderer, `beacons` fidelity, rotating
+beacon and planners. Only that it holds 1 - e^{-b r} of what absorption leaves is known to `optics.arrival` as well.
+
 Wells' optical transfer function of a path r is e^{-(a+b) r} e^{b r F(ψ)} with F = (1 - e^{-k}) / k, k = 2π θ0 ψ and ψ
 in cycles per radian. Without its unscattered part it is e^{-a r} × e^{-b r} (e^{b r F} - 1).
 
@@ -18,9 +21,11 @@ from functools import lru_cache
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.optics.light_loop import rows_of
+from auvdock.numeric.records import Records
+from auvdock.optics.spread import HaloPlaces, place_in_halo
+from auvdock.optics.water import WaterCfg
 
-__all__ = ["HaloTable", "halo_table", "wells_transfer"]
+__all__ = ["HaloTable", "halo_of", "halo_table", "wells_transfer"]
 
 _ROWS = 72
 _MIN_BR, _MAX_BR = 1e-3, 40.0
@@ -41,14 +46,15 @@ class HaloTable:
     The whole halo holds 1 - e^{-b r}. Beyond b r = 40 the table is held constant in shape.
 
     Attributes:
-        places: (4,) where in the table which b r is, for `light_loop.rows_of`.
+        places: where in the table which b r is, one row.
     """
 
     def __init__(self, theta0_rad: float) -> None:
         """Scale the universal table to an angle."""
         self.theta0_rad = theta0_rad
         log_br, self._log_t, self._log_density, self._encircled = _universal()
-        self.places = np.array([log_br[0], 1.0 / (log_br[1] - log_br[0]), _MIN_BR, 0.999 * _MAX_BR])
+        places = HaloPlaces(log_br[0], 1.0 / (log_br[1] - log_br[0]), _MIN_BR, 0.999 * _MAX_BR)
+        self.places: Records[HaloPlaces] = places.packed()
 
     def density_rows(self, angle_rad: Array) -> Array:
         """(rows, m) halo per steradian at fixed angles (m,), one row per tabulated b r; see `row_of`."""
@@ -61,9 +67,22 @@ class HaloTable:
         t = np.log(np.clip(angle_rad / self.theta0_rad, _MIN_T, _MAX_T))
         return np.array([np.interp(t, self._log_t, row) for row in self._encircled])
 
+    def scattered(self, br: Array) -> Array:
+        """(n,) the whole halo at b r (n,): 1 - e^{-b r}."""
+        return -np.expm1(-br)
+
+    def transfer(self, br: float, frequency_cycles_rad: Array) -> tuple[Array, Array]:
+        """Optical transfer function (m,) at frequencies (m,), and its derivative by the frequency."""
+        k = 2.0 * math.pi * self.theta0_rad * frequency_cycles_rad
+        mean = -np.expm1(-k) / k
+        slope = (
+            2.0 * math.pi * self.theta0_rad * br * np.exp(br * (mean - 1.0)) * (k * np.exp(-k) + np.expm1(-k)) / k**2
+        )
+        return wells_transfer(br, frequency_cycles_rad, self.theta0_rad), slope
+
     def row_of(self, br: Array) -> tuple[IntArray, Array]:
         """Row (n,) below each b r (n,) and the weight (n,) of the row above: linear in log b r."""
-        return rows_of(br, self.places)
+        return place_in_halo(br, self.places)
 
     def density(self, br: float, angle_rad: Array) -> Array:
         """(m,) halo per steradian at angles (m,) for one b r."""
@@ -78,6 +97,11 @@ class HaloTable:
         blend = rows[row[0]] * (1.0 - weight[0]) + rows[row[0] + 1] * weight[0]
         # Rows hold the halo per scattered energy, which itself is known exactly.
         return blend * -math.expm1(-br)
+
+
+def halo_of(water: WaterCfg) -> HaloTable:
+    """The halo in a water."""
+    return halo_table(water.scattering_angle_rad)
 
 
 @lru_cache(maxsize=16)

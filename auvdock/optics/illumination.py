@@ -32,14 +32,13 @@ class Illumination:
         """Precompute what each lamp gives."""
         self._lit = lit
         count = lit.lights.station_count
-        nm = np.array([beacon.wavelength_nm for beacon in lit.layout.beacons])
+        nm = np.array([beacon.wavelength_nm for beacon in lit.setup.layout.beacons])
         bands = np.array([np.interp(nm, BANDS_NM, row) for row in np.eye(3)]).T
-        spill = lit.lights.flux_w[:count] * lit.cfg.lamp_spill / (16.0 * math.pi)
-        rotation, origin = lit.T_world_station[:3, :3], lit.T_world_station[:3, 3]
-        self.lamps_m: Array = lit.lights.positions_m[:count] @ rotation.T + origin
+        spill = lit.lights.column("flux_w")[:count] * lit.setup.imaging.lamp_spill / (16.0 * math.pi)
+        rotation, origin = lit.setup.T_world_station[:3, :3], lit.setup.T_world_station[:3, 3]
+        self.lamps_m: Array = lit.lights.column("place_m")[:count] @ rotation.T + origin
         self.spill_w_sr: Array = spill[:, None] * bands
-        self.spill_w_sr[lit.dead] = 0.0
-        self.absorption_per_m: Array = lit.lights.absorption_per_m[:count].copy()
+        self.absorption_per_m: Array = lit.lights.column("absorption_per_m")[:count]
 
     def at(self, points_world: Array, T_world_camera: Array) -> Array:
         """(n, 3) irradiance per band at points (n, 3) on surfaces that face up, the camera being at a pose (4, 4)."""

@@ -10,26 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array
-from auvdock.core.beacons import BeaconLayout
-from auvdock.core.camera import Camera
 from auvdock.core.contracts import Frame
-from auvdock.core.landing_station import TagCfg
 from auvdock.core.response import CameraResponse
-from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.optics.beam_image import BeamImage
 from auvdock.optics.exposure import AutoExposure, frames_of_a_turn
-from auvdock.optics.faults import FaultCfg, TagCover
-from auvdock.optics.lamp import LampCfg
+from auvdock.optics.faults import TagCover
 from auvdock.optics.lights_image import LightsImage, add_spot
 from auvdock.optics.metering import predicted_share
-from auvdock.optics.nuisance import NuisanceCfg
-from auvdock.optics.scene import LitScene, View
+from auvdock.optics.scene import LitScene
 from auvdock.optics.sensor import Sensor, SensorScale, saturated_share
 from auvdock.optics.settings import ExposureCfg, ImagingCfg
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.surfaces import Surfaces
 from auvdock.optics.tag_image import TagImage
 from auvdock.optics.tag_scene import TagScene
-from auvdock.optics.water import WaterCfg
+from auvdock.optics.view import View
 
 TAG_GEOM = "tag"
 """Name of the geom that shows the tag in MuJoCo's model, for views other than this camera's."""
@@ -69,64 +64,31 @@ class UnderwaterCamera:
     Auto-exposure reacts to the frames taken before; `reset` forgets them.
     """
 
-    def __init__(
-        self,
-        camera: Camera,
-        water: WaterCfg,
-        layout: BeaconLayout,
-        nuisance: NuisanceCfg,
-        cfg: ImagingCfg,
-        T_world_station: Array,
-        scene: HasModel | None = None,
-        rotating: RotatingBeaconCfg | None = None,
-        *,
-        seen_from: str = "front",
-        tag: TagCfg | None = None,
-        lamp: LampCfg | None = None,
-        faults: FaultCfg | None = None,
-    ) -> None:
+    def __init__(self, setup: OpticalSetup, scene: HasModel | None = None) -> None:
         """Precompute tables; no OpenGL context is made before a frame needs one.
 
         Args:
-            camera: intrinsics, distortion and mounting.
-            water: what lies between.
-            layout: the station's beacons.
-            nuisance: what makes the scene hard.
-            cfg: the camera as an instrument.
-            T_world_station: (4, 4) pose of the station frame.
-            scene: owner of the MuJoCo model whose static geoms are drawn; without it only lights are.
-            rotating: the station's rotating beacon, if it has one.
-            seen_from: "front" for a funnel along x, "above" for a platform whose lights shine up.
-            tag: a marker on the station; a geom named `TAG_GEOM` of the model is left out in its favour.
-            lamp: the vehicle's own lamps beside the camera.
-            faults: lights that are dead, and when the tag is covered.
+            setup: camera, water and lights.
+            scene: owner of the MuJoCo model whose static geoms are drawn, except one named `TAG_GEOM` where there is a
+                tag; without it only lights and tag are.
+
+        Raises:
+            ConfigError: a dead light that the station does not have.
         """
-        faults = faults if faults is not None else FaultCfg()
-        self.lit = LitScene(
-            camera,
-            water,
-            layout,
-            nuisance,
-            cfg,
-            T_world_station,
-            rotating,
-            seen_from=seen_from,
-            lamp=lamp,
-            dead_lights=faults.dead_lights,
-        )
-        self.tag = TagImage(TagScene(self.lit, tag)) if tag is not None else None
-        self._cover = TagCover(faults)
-        self._hidden = False
-        self.exposure = AutoExposure(cfg.exposure, frames_of_a_turn(camera, rotating))
-        self._cfg, self._camera, self._water = cfg, camera, water
-        self._response = CameraResponse(cfg.encoding, cfg.full_well_e, cfg.read_noise_e)
-        self._sensor = Sensor(camera.width_px, camera.height_px, cfg)
-        hidden = (TAG_GEOM,) if tag is not None else ()
-        self._surfaces = Surfaces(self.lit, scene.model, hidden) if scene is not None and cfg.surfaces else None
-        solid = self.lit.lens.solid_angle_sr.astype(np.float32)
-        self._solid_angle = np.repeat(solid[:, :, None], 3, axis=2)
-        self._beam_image: BeamImage | None = None
+        imaging, camera = setup.imaging, setup.camera
+        self.lit = LitScene(setup)
+        self.tag = TagImage(TagScene(self.lit, setup.tag)) if setup.tag is not None else None
+        self._cover = TagCover(setup.faults)
+        self.exposure = AutoExposure(imaging.exposure, frames_of_a_turn(camera, setup.rotating))
+        self._camera = camera
+        self._response = CameraResponse(imaging.encoding, imaging.full_well_e, imaging.read_noise_e)
+        self._sensor = Sensor(camera.width_px, camera.height_px, imaging)
+        hidden = (TAG_GEOM,) if setup.tag is not None else ()
+        self.surfaces = Surfaces(self.lit, scene.model, hidden) if scene is not None and imaging.surfaces else None
+        """Station and floor; None where they are not drawn."""
         lens = self.lit.lens
+        self._solid_angle = np.repeat(lens.solid_angle_sr.astype(np.float32)[:, :, None], 3, axis=2)
+        self._beam_image: BeamImage | None = None
         # Enlarged coarse pixels may reach over the image's right and lower edge.
         self._whole = np.empty((lens.shape[0] * lens.factor, lens.shape[1] * lens.factor, 3), dtype=np.float32)
         self.reset(np.random.default_rng(0))
@@ -134,17 +96,18 @@ class UnderwaterCamera:
     def reset(self, rng: np.random.Generator) -> None:
         """Start an episode: new noise, new nuisances, exposure from scratch."""
         self.lit.reset(rng)
-        self._lights = LightsImage(self.lit.lens, self.lit.lights, self._water, self.lit.spots)
-        if self.lit.rotating is not None:
-            self._beam_image = BeamImage(self.lit.lens, self.lit.lights, self.lit.rotating.lamp, self._water)
+        lit = self.lit
+        self._lights = LightsImage(lit.lens, lit.lights, lit.water, lit.spots)
+        if lit.rotating is not None:
+            self._beam_image = BeamImage(lit.lens, lit.lights, lit.rotating.lamp, lit.water)
         self._sensor.reset(self.lit.sensor_rng)
         self.exposure.reset()
         self._cover.reset()
 
     def close(self) -> None:
         """Free OpenGL's context, if one was made."""
-        if self._surfaces is not None:
-            self._surfaces.close()
+        if self.surfaces is not None:
+            self.surfaces.close()
 
     def capture(self, T_world_body: Array, time_s: float, station_time_s: float | None = None) -> Frame:
         """Take a frame from a body pose (4, 4).
@@ -162,24 +125,25 @@ class UnderwaterCamera:
     def take(self, T_world_body: Array, time_s: float, station_time_s: float | None = None) -> Shot:
         """Take a frame as `capture` does, with what it was made of: for fitting detection models."""
         view = self.lit.look(T_world_body, time_s, station_time_s, self.exposure.exposure_s)
+        tag_hidden = False
         if self.tag is not None:
-            self._hidden = self._cover.hidden(self.tag.scene.height_m(view.T_world_camera), time_s)
+            tag_hidden = self._cover.hidden(self.tag.scene.height_m(view.T_world_camera), time_s)
         if not self.exposure.settled:
-            self._settle(view)
+            self._settle(view, tag_hidden)
         exposure_s, gain = self.exposure.exposure_s, self.exposure.gain
-        self.electrons(view, exposure_s, gain)
+        self.electrons(view, exposure_s, gain, tag_hidden=tag_hidden)
         image = self._sensor.expose(self._whole, gain)
         code = self.lit.scale(gain).metered_code(self.exposure.metered)
         self.exposure.update(saturated_share(image, code))
         return Shot(Frame(image, time_s, self._camera, exposure_s, gain, self._response), view, exposure_s, gain)
 
-    def _settle(self, view: View) -> None:
+    def _settle(self, view: View, tag_hidden: bool) -> None:
         """Choose the first exposure: from the lights, or from a trial picture where tag and lamp count as well."""
         if self.tag is None and self.lit.lamp is None:
             self.exposure.settle(predicted_share(self.lit, view, metered=self.exposure.metered))
             return
-        bright = np.sort(self.electrons(view, 1.0).reshape(-1)[::7])
-        level = SensorScale(self._cfg, 1.0).saturated_e
+        bright = np.sort(self.electrons(view, 1.0, tag_hidden=tag_hidden).reshape(-1)[::7])
+        level = SensorScale(self.lit.setup.imaging, 1.0).saturated_e
         self.exposure.settle(lambda s: 1.0 - float(np.searchsorted(bright, level / s)) / bright.size)
 
     @property
@@ -187,37 +151,37 @@ class UnderwaterCamera:
         """(H, W, 3) the image's part of what is drawn on; a view, made anew since pickling would part the two."""
         return self._whole[: self._camera.height_px, : self._camera.width_px]
 
-    def electrons(self, view: View, exposure_s: float, gain: float = 1.0) -> NDArray[np.float32]:
+    def electrons(
+        self, view: View, exposure_s: float, gain: float = 1.0, *, tag_hidden: bool = False
+    ) -> NDArray[np.float32]:
         """Mean photo-electrons (H, W, 3), red, green, blue, without noise; valid until the next call."""
-        lens = self.lit.lens
-        received = view.received
-        lit = np.flatnonzero((received.halo_w_m2 + received.core_w_m2 > 0.0) & (received.ray_camera[:, 2] > 0.0))
-        coarse = self._lights.coarse(received, lit, exposure_s)
+        lens, arrivals = self.lit.lens, view.arrivals
+        lit = np.flatnonzero(view.in_sight)
+        coarse = self._lights.coarse(arrivals, lit, exposure_s)
         if view.beam is not None and self._beam_image is not None:
             self._beam_image.add(coarse, view.beam, exposure_s)
-        surfaces = self._surfaces
-        depth_m = -float(view.T_world_camera[2, 3])
+        surfaces = self.surfaces
         drawn: NDArray[np.float32] | None = None
         if surfaces is not None and surfaces.visible(view.T_world_camera[:3, 3], exposure_s * gain):
             rows, columns = surfaces.shape
-            drawn = surfaces.electrons(view.T_world_camera, exposure_s)
-            self._add_backscatter(coarse, surfaces.distance, exposure_s)
+            drawn, distance = surfaces.electrons(view.T_world_camera, exposure_s)
+            self._add_backscatter(coarse, distance, exposure_s)
             image = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR)
             image += drawn
         else:
             self._add_backscatter(coarse, None, exposure_s)
             image = coarse
-            veil = self.lit.veil_w_m2_sr(depth_m)
+            veil = self.lit.veil_w_m2_sr(view.depth_m)
             if veil.max() > 0.0:
                 even = (self.lit.electrons_per_j @ veil * exposure_s).astype(np.float32) * self._solid_angle
                 image += even
                 drawn = even
         cv2.resize(image, self._whole.shape[1::-1], self._whole, interpolation=cv2.INTER_LINEAR)
         if self.tag is not None:
-            self.tag.add(self._whole, view.T_world_camera, exposure_s, drawn, hidden=self._hidden)
-        near, shown = lens.locate(received.ray_camera, self._lights.reach_px)
+            self.tag.add(self._whole, view.T_world_camera, exposure_s, drawn, hidden=tag_hidden)
+        near, shown = lens.locate(arrivals["ray_camera"].copy(), self._lights.reach_px)
         index = lit[shown[lit]]
-        self._lights.add_fine(self._whole, received, near, index, exposure_s)
+        self._lights.add_fine(self._whole, arrivals, near, index, exposure_s)
         if view.flakes is not None:
             self._add_flakes(view, exposure_s)
         return self._buffer
@@ -233,13 +197,13 @@ class UnderwaterCamera:
         image += light * self._solid_angle
 
     def _add_flakes(self, view: View, exposure_s: float) -> None:
-        flakes = view.flakes
+        flakes, imaging = view.flakes, self.lit.setup.imaging
         if flakes is None:
             return
         colour = self.lit.flake_channel(view) * exposure_s
-        floor = 0.3 * self._cfg.read_noise_e
+        floor = 0.3 * imaging.read_noise_e
         for pixel, light, width in zip(flakes.pixels, flakes.irradiance_w_m2, flakes.sigma_px, strict=True):
             energy = (colour * light).astype(np.float32)
             if energy.max() > floor:
-                sigma = float(np.hypot(self._cfg.lens_sigma_px, width))
+                sigma = float(np.hypot(imaging.lens_sigma_px, width))
                 add_spot(self._whole, pixel, min(sigma, 20.0), energy)

@@ -8,60 +8,45 @@ import numpy as np
 
 from auvdock.assets import asset, asset_names
 from auvdock.core.arrays import Array
-from auvdock.core.camera import Camera
 from auvdock.core.contracts import Detections, TagDetection
 from auvdock.core.errors import ConfigError
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.core.strict import load_toml
 from auvdock.optics.detection_model import DetectionModelCfg, draw_detections
 from auvdock.optics.exposure import AutoExposure
-from auvdock.optics.faults import FaultCfg, TagCover
+from auvdock.optics.faults import TagCover
 from auvdock.optics.ground import Ground
-from auvdock.optics.lamp import LampCfg
 from auvdock.optics.metering import predicted_share
-from auvdock.optics.nuisance import NuisanceCfg
-from auvdock.optics.scene import LitScene, View
-from auvdock.optics.sensing import candidates_in_view
+from auvdock.optics.scene import LitScene
+from auvdock.optics.sensing import meet
 from auvdock.optics.sensor import SensorScale
-from auvdock.optics.settings import ImagingCfg
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.spots import Spots
 from auvdock.optics.tag_model import TagModelCfg, draw_tag, load_tag_model, tag_sight
 from auvdock.optics.tag_scene import TagScene
-from auvdock.optics.water import WaterCfg
+from auvdock.optics.view import View
 
 __all__ = ["LandingSensor", "landing_share", "load_landing_detection_model"]
 
 
 class LandingSensor:
-    """Gives what the detectors would give, from the same lamps, water, faults and exposure law as `LandingCamera`."""
+    """Gives what the detectors would give, from the same lamps, water, faults and exposure law as the renderer."""
 
     def __init__(
         self,
-        camera: Camera,
-        water: WaterCfg,
+        setup: OpticalSetup,
         station: LandingStationCfg,
-        nuisance: NuisanceCfg,
-        imaging: ImagingCfg,
-        lamp: LampCfg | None,
-        faults: FaultCfg,
-        T_world_station: Array,
         *,
         detector_name: str = "threshold",
         tag_detector_name: str = "apriltag",
         model: DetectionModelCfg | None = None,
         tag_model: TagModelCfg | None = None,
     ) -> None:
-        """Precompute tables; the first eight arguments are those of `LandingCamera`.
+        """Precompute tables.
 
         Args:
-            camera: intrinsics, distortion and mounting.
-            water: what lies between.
-            station: the platform with its lights and its tag.
-            nuisance: what makes the scene hard.
-            imaging: the camera as an instrument.
-            lamp: the vehicle's own lamps, None for none.
-            faults: dead lights and a covered tag.
-            T_world_station: (4, 4) pose of the station frame.
+            setup: camera, water and lights.
+            station: the platform.
             detector_name: detector of lights whose behaviour, fitted on landing frames, is drawn from.
             tag_detector_name: detector of tags whose fitted behaviour is drawn from.
             model: the former's behaviour itself, in place of the fitted one.
@@ -72,28 +57,17 @@ class LandingSensor:
         """
         self.model = model if model is not None else load_landing_detection_model(detector_name)
         self.tag_model = tag_model if tag_model is not None else load_tag_model(tag_detector_name)
-        self.lit = LitScene(
-            camera,
-            water,
-            station.layout,
-            nuisance,
-            imaging,
-            T_world_station,
-            seen_from="above",
-            lamp=lamp,
-            dead_lights=faults.dead_lights,
-        )
+        self.lit = LitScene(setup)
         self.tag = TagScene(self.lit, station.tag)
         self.ground = Ground(self.tag, station)
-        self.exposure = AutoExposure(imaging.exposure)
-        self._cover = TagCover(faults)
-        self._size = (camera.width_px, camera.height_px)
+        self.exposure = AutoExposure(setup.imaging.exposure)
+        self._cover = TagCover(setup.faults)
+        self._size = (setup.camera.width_px, setup.camera.height_px)
         self.reset(np.random.default_rng(0))
 
     def reset(self, rng: np.random.Generator) -> None:
         """Start an episode: new nuisances, exposure from scratch."""
         self.lit.reset(rng)
-        self._rng = self.lit.sensor_rng
         self._tag_rng = rng.spawn(1)[0]
         self.exposure.reset()
         self._cover.reset()
@@ -101,16 +75,16 @@ class LandingSensor:
     def detect(self, T_world_body: Array, time_s: float) -> tuple[Detections, tuple[TagDetection, ...]]:
         """Detections of lights and of the tag in a frame from a body pose (4, 4)."""
         view = self.lit.look(T_world_body, time_s)
-        spots = self.lit.spots.spots(view.received, view.inside.nonzero()[0])
+        spots = self.lit.spots.spread(view.arrivals, view.inside.nonzero()[0])
         hidden = self._cover.hidden(self.tag.height_m(view.T_world_camera), time_s)
         ground = self.ground.electrons_per_s(view.T_world_camera, tag_hidden=hidden)
         exposure = self.exposure
         if not exposure.settled:
             exposure.settle(landing_share(self.lit, view, spots, ground))
         exposure_s, gain = exposure.exposure_s, exposure.gain
-        seen, share = candidates_in_view(self.lit, view, spots, exposure_s, gain, ground_e_s=np.median(ground, axis=0))
+        seen, share = meet(self.lit, view, spots, exposure_s, gain, ground_e_s=np.median(ground, axis=0))
         exposure.update(share + float(np.mean(ground * exposure_s >= self.lit.scale(gain).saturated_e)))
-        detections = draw_detections(seen, self.model, self._size, self._rng)
+        detections = draw_detections(seen, self.model, self._size, self.lit.sensor_rng)
         tag = None if hidden else self.tag.look(view)
         sight = None if tag is None else tag_sight(tag, self.lit, exposure_s, gain)
         return detections, draw_tag(sight, self.tag.tag.tag_id, self.tag_model, self._tag_rng)
@@ -132,5 +106,5 @@ def load_landing_detection_model(name: str) -> DetectionModelCfg:
 def landing_share(lit: LitScene, view: View, spots: Spots, ground_e_s: Array) -> Callable[[float], float]:
     """Saturated share of the image as a function of sensitivity in seconds: lights, and ground (n, 3)."""
     lights = predicted_share(lit, view, spots)
-    saturated_e = SensorScale(lit.cfg, 1.0).saturated_e
+    saturated_e = SensorScale(lit.setup.imaging, 1.0).saturated_e
     return lambda s: lights(s) + float(np.mean(ground_e_s * s >= saturated_e))

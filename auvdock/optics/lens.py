@@ -9,7 +9,8 @@ import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.camera import Camera
-from auvdock.optics.light_loop import located
+from auvdock.numeric.records import Records
+from auvdock.optics.arrival import Projection, locate
 from auvdock.optics.settings import ImagingCfg
 
 __all__ = ["Lens"]
@@ -25,8 +26,7 @@ class Lens:
         shape: (rows, columns) of the coarse grid.
         aperture_m2: area of the entrance pupil times the lens' transmission.
         rad_per_px: angle of a pixel in the middle of the image.
-        numbers: (12,) of a lens without tangential distortion, for `light_loop.located`: the greatest squared tangent,
-            offset from the image's middle (2), k1, k2, k3, focal lengths (2), principal point (2) and middle (2) in px.
+        projection: the same for compiled code, one row.
         max_tangent: tangent of the angle between the optical axis and the farthest corner of the image.
     """
 
@@ -36,10 +36,6 @@ class Lens:
         self.factor = _coarse_factor(camera.width_px)
         columns, rows = -(-camera.width_px // self.factor), -(-camera.height_px // self.factor)
         self.shape = (rows, columns)
-        k1, k2, p1, p2, k3 = (float(k) for k in camera.distortion)
-        self._radial = (k1, k2, k3) if p1 == 0.0 and p2 == 0.0 else None
-        self._focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
-        self._centre = np.array([camera.matrix[0, 2], camera.matrix[1, 2]])
         self._middle = np.array([(camera.width_px - 1) / 2, (camera.height_px - 1) / 2])
         focal_px = float(camera.matrix[0, 0])
         self.rad_per_px = 1.0 / focal_px
@@ -49,7 +45,7 @@ class Lens:
         corner = camera.normalise(np.array([[-0.5, -0.5], [last_x, last_y], [last_x, -0.5], [-0.5, last_y]]))
         self._max_tangent2 = float(np.max(np.sum(corner**2, axis=1)))
         self.max_tangent = math.sqrt(self._max_tangent2)
-        self.numbers = self._numbers_at(0.0)
+        self.projection: Records[Projection] = self._projection_at(0.0)
 
     @cached_property
     def rays(self) -> Array:
@@ -99,34 +95,15 @@ class Lens:
         Rays beyond the image's corners (by more than the margin) have no meaningful pixel: the distortion polynomial
         folds back there.
         """
-        if self._radial is not None:
-            return located(rays, self.numbers if margin_px == 0.0 else self._numbers_at(margin_px))
-        limit, reach = self._edges_at(margin_px)
-        ahead = rays[:, 2] > 0.0
-        xy = rays[:, :2] / np.where(ahead, rays[:, 2], 1.0)[:, None]
-        inside = ahead & (np.sum(xy * xy, axis=1) <= limit)
-        pixels = self.camera.project(np.where(inside[:, None], rays, _AHEAD))
-        inside &= np.all(np.abs(pixels - self._middle) < reach, axis=1)
-        return pixels, inside
+        return locate(rays, self.projection if margin_px == 0.0 else self._projection_at(margin_px))
 
-    @property
-    def is_radial(self) -> bool:
-        """Whether `numbers` tell all about the lens."""
-        return self._radial is not None
-
-    def _numbers_at(self, margin_px: float) -> Array:
-        """`numbers` with a margin about the image."""
-        limit, reach = self._edges_at(margin_px)
-        radial = self._radial or (0.0, 0.0, 0.0)
-        return np.array([limit, *reach, *radial, *self._focal, *self._centre, *self._middle])
-
-    def _edges_at(self, margin_px: float) -> tuple[float, Array]:
-        """Greatest squared tangent to the optical axis and offset from the image's middle (2,), with a margin."""
+    def _projection_at(self, margin_px: float) -> Records[Projection]:
+        """`projection` with a margin about the image."""
+        matrix, distortion = self.camera.matrix, self.camera.distortion
         limit = self._max_tangent2 * (1.0 + margin_px * self.rad_per_px) ** 2
-        return limit, self._middle + (0.5 + margin_px)
-
-
-_AHEAD = np.array([0.0, 0.0, 1.0])
+        brown = np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *distortion])
+        tangential = bool(distortion[2] != 0.0 or distortion[3] != 0.0)
+        return Projection(brown, tangential, limit, self._middle, self._middle + (0.5 + margin_px)).packed()
 
 
 def _coarse_factor(width_px: int) -> int:

@@ -9,6 +9,8 @@ table says. Table and patch share one index, the fourth root of the squared chor
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
@@ -16,9 +18,11 @@ from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
-from auvdock.optics.halo import halo_table
+from auvdock.numeric.records import Record, Records
+from auvdock.optics.arrival import Arrival
+from auvdock.optics.halo import halo_of
 from auvdock.optics.lens import Lens
-from auvdock.optics.radiometry import LightSet, Received
+from auvdock.optics.radiometry import LightSet
 from auvdock.optics.spots import SpotModel
 from auvdock.optics.water import WaterCfg
 
@@ -31,18 +35,74 @@ _LEAST_E = 2e-3
 """Electrons in a pixel below which a lamp's halo is not worth drawing: of a hundred such nothing is seen."""
 
 
+class _Table(NamedTuple):
+    """Halos by b r and the angle from the lamp.
+
+    Attributes:
+        rows: (h, entries) halo per steradian of unit light.
+        inner_angle2: (i,) squared angles of the entries within the split.
+        scale: entries per unit of the fourth root of the squared chord.
+    """
+
+    rows: NDArray[np.float32]
+    inner_angle2: NDArray[np.float32]
+    scale: np.float32
+
+
+@dataclass
+class _Halo(Record):
+    """Where in the table a lamp's halo is, and its smooth part within the split: A + B θ². Of single precision."""
+
+    row: int
+    weight: float
+    """Of the row above."""
+    level: float
+    """A, of unit light per steradian."""
+    curve: float
+    """B."""
+
+
+@dataclass
+class _Smooth(Record):
+    """A lamp whose smooth part is drawn on the coarse grid."""
+
+    halo: _Halo
+    ray_camera: Annotated[NDArray[np.float32], 3]
+    light_w_m2: float
+    """Of single precision."""
+    colour: int
+    """Which of the different colours of the lamps."""
+
+
+@dataclass
+class _Fine(Record):
+    """A lamp whose core and whose halo's remainder are drawn at full resolution."""
+
+    halo: _Halo
+    pixel: Annotated[Array, 2]
+    metric: Annotated[Array, 3]
+    """`Lens.metric` there."""
+    soft_rad2: float
+    """Squared angle by which the core's blur softens the halo's cusp."""
+    sigma_px: float
+    """Of the core."""
+    halo_e: Annotated[NDArray[np.float32], 3]
+    """Electrons of the remainder."""
+    core_e: Annotated[NDArray[np.float32], 3]
+    """Electrons of the core."""
+
+
 class LightsImage:
     """Cores and halos of a set of lamps on one camera's sensor."""
 
     def __init__(self, lens: Lens, lights: LightSet, water: WaterCfg, spots: SpotModel) -> None:
         """Tabulate the halo on the shared index."""
         self._lens, self._spots = lens, spots
-        self._scale = np.float32((_ENTRIES - 1) / _ROOT_2)
-        index = np.arange(_ENTRIES) / float(self._scale)
+        scale = np.float32((_ENTRIES - 1) / _ROOT_2)
+        index = np.arange(_ENTRIES) / float(scale)
         angle = np.maximum(2.0 * np.arcsin(np.minimum(index**2 / 2.0, 1.0)), 1e-7)
-        table = halo_table(water.scattering_angle_rad)
-        self._table = table
-        self._rows = table.density_rows(angle).astype(np.float32)
+        table = halo_of(water)
+        self._halo = table
         split_px = _SPLIT_COARSE_PX * lens.factor
         self._split_px = split_px
         self.reach_px = float(split_px)
@@ -50,137 +110,120 @@ class LightsImage:
         inner = np.array([self._split_rad, 0.97 * self._split_rad, 1.03 * self._split_rad])
         self._inner_rows = table.density_rows(inner)
         self._encircled = table.encircled_rows(inner[:1])[:, 0]
-        last = int(math.sqrt(2.0 * math.sin(self._split_rad / 2.0)) * float(self._scale))
-        self._inner_angle2 = (angle[: last + 1] ** 2).astype(np.float32)
+        last = int(math.sqrt(2.0 * math.sin(self._split_rad / 2.0)) * float(scale))
+        rows, inner_angle2 = table.density_rows(angle).astype(np.float32), (angle[: last + 1] ** 2).astype(np.float32)
+        self._table = _Table(rows, inner_angle2, scale)
         self._rays = np.ascontiguousarray(lens.rays.T, dtype=np.float32)
         self._coarse_solid_angle = lens.solid_angle_sr.ravel().astype(np.float32)
-        self._channel = lights.electrons_per_j * lens.aperture_m2
+        self._channel = lights.column("electrons_per_j") * lens.aperture_m2
         self._most_channel = self._channel.max(axis=1)
         self._colours, self._colour_of = np.unique(self._channel, axis=0, return_inverse=True)
 
-    def coarse(self, received: Received, index: IntArray, exposure_s: float) -> NDArray[np.float32]:
+    def coarse(self, arrivals: Records[Arrival], index: IntArray, exposure_s: float) -> NDArray[np.float32]:
         """Smooth parts of the halos of lamps `index` (m,): electrons per image pixel on the coarse grid, (h, w, 3)."""
         shape = self._lens.shape
         if len(index) == 0:
             return np.zeros((*shape, 3), dtype=np.float32)
-        row, weight, smooth = self._halos(received, index)
-        light = received.halo_w_m2[index]
+        halos, light = self._halos(arrivals, index), arrivals["halo_w_m2"][index]
         per_e = self._most_channel[index] * exposure_s * self._lens.rad_per_px**2
-        shown = np.flatnonzero(light * smooth[:, 0] * per_e > _LEAST_E)
+        shown = np.flatnonzero(light * halos["level"] * per_e > _LEAST_E)
+        lamps = _Smooth.zeros(len(shown))
+        lamps["halo"], lamps["light_w_m2"] = halos[shown], light[shown].astype(np.float32)  # type: ignore[index]  # some rows
+        lamps["ray_camera"], lamps["colour"] = arrivals["ray_camera"][index[shown]], self._colour_of[index[shown]]
         radiance = np.zeros((len(self._colours), self._rays.shape[1]), dtype=np.float32)
-        _add_smooth(
-            radiance,
-            self._colour_of[index[shown]],
-            self._rays,
-            received.ray_camera[index[shown]].astype(np.float32),
-            self._rows,
-            row[shown],
-            weight[shown],
-            smooth[shown],
-            self._inner_angle2,
-            self._scale,
-            light[shown].astype(np.float32),
-        )
+        _add_smooth(radiance, self._rays, lamps, self._table)
         radiance *= self._coarse_solid_angle
         planes = (self._colours.T * exposure_s).astype(np.float32) @ radiance
         return np.asarray(cv2.merge(list(planes.reshape(3, *shape))), dtype=np.float32)
 
     def add_fine(
-        self, image: NDArray[np.float32], received: Received, pixels: Array, index: IntArray, exposure_s: float
+        self, image: NDArray[np.float32], arrivals: Records[Arrival], pixels: Array, index: IntArray, exposure_s: float
     ) -> None:
         """Add the halos' fine remainders and the cores of lamps `index` (m,) at their pixels to `image` (H, W, 3)."""
         if len(index) == 0:
             return
-        row, weight, smooth = self._halos(received, index)
-        sigma = self._spots.sigma_px(received.range_m[index])
-        centre = np.rint(pixels[index])
-        metric = self._lens.metric_at(centre)
-        # The core's blur also softens the cusp of the halo.
-        soft = 1.5 * sigma**2 * self._lens.rad_per_px**2
+        halos, lamps = self._halos(arrivals, index), _Fine.zeros(len(index))
+        row, weight = halos["row"], halos["weight"].astype(np.float32)
+        sigma = self._spots.sigma_px(arrivals["range_m"][index])
         encircled = self._encircled[row] * (1.0 - weight) + self._encircled[row + 1] * weight
         t2 = self._split_rad**2
-        inside = encircled - math.pi * t2 * (smooth[:, 0] + 0.5 * smooth[:, 1] * t2)
+        level, curve = halos["level"].astype(np.float32), halos["curve"].astype(np.float32)
+        inside = encircled - math.pi * t2 * (level + 0.5 * curve * t2)
         colour = self._channel[index] * exposure_s
-        halo = (colour * (received.halo_w_m2[index] * inside)[:, None]).astype(np.float32)
-        core = (colour * received.core_w_m2[index, None]).astype(np.float32)
-        _add_lights(
-            image,
-            pixels[index],
-            self._split_px,
-            metric,
-            soft,
-            self._rows,
-            row,
-            weight,
-            smooth,
-            self._inner_angle2,
-            self._scale,
-            sigma,
-            halo,
-            core,
-        )
+        lamps["halo"], lamps["pixel"], lamps["sigma_px"] = halos, pixels[index], sigma
+        lamps["metric"] = self._lens.metric_at(np.rint(pixels[index]))
+        lamps["soft_rad2"] = 1.5 * sigma**2 * self._lens.rad_per_px**2
+        lamps["halo_e"] = colour * (arrivals["halo_w_m2"][index] * inside)[:, None]
+        lamps["core_e"] = colour * arrivals["core_w_m2"][index, None]
+        _add_lights(image, lamps, self._table, self._split_px)
 
-    def _halos(self, received: Received, index: IntArray) -> tuple[IntArray, NDArray[np.float32], NDArray[np.float32]]:
-        """Row and weight (m,) of the lamps' halos in the table, and the smooth inner parts' A, B of A + B θ² (m, 2)."""
-        row, weight = self._table.row_of(received.scattering_depth[index])
+    def _halos(self, arrivals: Records[Arrival], index: IntArray) -> Records[_Halo]:
+        """The halos of lamps `index` (m,)."""
+        row, weight = self._halo.row_of(arrivals["scattering_depth"][index])
         ends = self._inner_rows[row] * (1.0 - weight[:, None]) + self._inner_rows[row + 1] * weight[:, None]
         slope = (ends[:, 2] - ends[:, 1]) / (0.06 * self._split_rad)
         curve = slope / (2.0 * self._split_rad)
-        level = ends[:, 0] - curve * self._split_rad**2
-        return row, weight.astype(np.float32), np.column_stack([level, curve]).astype(np.float32)
+        halos = _Halo.zeros(len(index))
+        halos["row"], halos["weight"] = row, weight.astype(np.float32)
+        halos["level"] = (ends[:, 0] - curve * self._split_rad**2).astype(np.float32)
+        halos["curve"] = curve.astype(np.float32)
+        return halos
 
 
 def add_spot(image: NDArray[np.float32], pixel: Array, sigma_px: float, energy: NDArray[np.float32]) -> None:
     """Add a Gaussian spot of total `energy` (3,), integrated over each pixel, at a sub-pixel position (2,)."""
-    _add_gaussian(image, float(pixel[0]), float(pixel[1]), sigma_px, energy)
+    _add_gaussian(image, pixel, sigma_px, energy)
 
 
 @compiled
 def _add_smooth(
-    radiance: NDArray[np.float32],
-    colour_of: IntArray,
-    grid: NDArray[np.float32],
-    rays: NDArray[np.float32],
-    rows: NDArray[np.float32],
-    row: IntArray,
-    weight: NDArray[np.float32],
-    smooth: NDArray[np.float32],
-    inner_angle2: NDArray[np.float32],
-    scale: np.float32,
-    light: NDArray[np.float32],
+    radiance: NDArray[np.float32], grid: NDArray[np.float32], lamps: Records[_Smooth], table: _Table
 ) -> None:
-    """Add the smooth parts of halos at `rays` (m, 3) to radiance (colours, n) at a grid (3, n)."""
+    """Add the smooth parts of lamps (m,) to radiance (colours, n) at a grid of rays (3, n)."""
+    rows, inner_angle2, scale = table
     inner, count, entries = len(inner_angle2), grid.shape[1], rows.shape[1]
-    table = np.empty(entries, dtype=np.float32)
+    density = np.empty(entries, dtype=np.float32)
     entry = np.empty(count, dtype=np.int32)
-    for lamp in range(len(rays)):
-        low, high, share, lamp_light = rows[row[lamp]], rows[row[lamp] + 1], weight[lamp], light[lamp]
+    for lamp in range(len(lamps)):
+        halo, light, ray = lamps[lamp].halo, np.float32(lamps[lamp].light_w_m2), lamps[lamp].ray_camera
+        low, high, share = rows[halo.row], rows[halo.row + 1], np.float32(halo.weight)
+        level, curve = np.float32(halo.level), np.float32(halo.curve)
         for i in range(entries):
-            table[i] = (low[i] + share * (high[i] - low[i])) * lamp_light
+            density[i] = (low[i] + share * (high[i] - low[i])) * light
         for i in range(inner):
-            table[i] = (smooth[lamp, 0] + smooth[lamp, 1] * inner_angle2[i]) * lamp_light
-        x, y, z = rays[lamp]
+            density[i] = (level + curve * inner_angle2[i]) * light
+        x, y, z = ray[0], ray[1], ray[2]
         for i in range(count):
             dx, dy, dz = grid[0, i] - x, grid[1, i] - y, grid[2, i] - z
             entry[i] = np.int32(np.sqrt(np.sqrt(dx * dx + dy * dy + dz * dz)) * scale)
-        out = radiance[colour_of[lamp]]
+        out = radiance[lamps[lamp].colour]
         for i in range(count):
-            out[i] += table[np.uint32(entry[i])]
+            out[i] += density[np.uint32(entry[i])]
+
+
+@compiled
+def _add_lights(image: NDArray[np.float32], lamps: Records[_Fine], table: _Table, reach: int) -> None:
+    """Add to an image lamps (m,): halos above their smooth parts, within `reach` pixels, and cores."""
+    rows, inner_angle2, scale = table
+    remainder = np.zeros(len(inner_angle2) + 1, dtype=np.float32)
+    for k in range(len(lamps)):
+        lamp, halo = lamps[k], lamps[k].halo
+        if max(lamp.halo_e.max(), lamp.core_e.max()) < _LEAST_E:
+            continue
+        low, high, share = rows[halo.row], rows[halo.row + 1], np.float32(halo.weight)
+        level, curve = np.float32(halo.level), np.float32(halo.curve)
+        for i in range(len(inner_angle2)):
+            remainder[i] = low[i] + share * (high[i] - low[i]) - (level + curve * inner_angle2[i])
+        _add_remainder(image, lamp, remainder, scale, reach)
+        _add_gaussian(image, lamp.pixel, lamp.sigma_px, lamp.core_e)
 
 
 @compiled
 def _add_remainder(
-    image: NDArray[np.float32],
-    x: float,
-    y: float,
-    reach: int,
-    metric: Array,
-    soft: float,
-    table: NDArray[np.float32],
-    scale: np.float32,
-    light: NDArray[np.float32],
+    image: NDArray[np.float32], lamp: _Fine, table: NDArray[np.float32], scale: np.float32, reach: int
 ) -> None:
-    """Add a halo's remainder `table` within `reach` pixels of (x, y), scaled to a total of `light` (3,)."""
+    """Add the remainder `table` of a lamp's halo within `reach` pixels, scaled to the electrons that it holds."""
+    x, y, metric = lamp.pixel[0], lamp.pixel[1], lamp.metric
     beyond, side = len(table) - 1, 2 * reach + 1
     left, top = round(x) - reach, round(y) - reach
     g11, g12, g22 = np.float32(metric[0]), np.float32(2.0 * metric[1]), np.float32(metric[2])
@@ -192,7 +235,7 @@ def _add_remainder(
     total = 0.0
     for j in range(side):
         dy = np.float32(top + j - y)
-        along, least = g12 * dy, g22 * dy * dy + np.float32(soft)
+        along, least = g12 * dy, g22 * dy * dy + np.float32(lamp.soft_rad2)
         for i in range(side):
             entry[i] = np.int32(np.sqrt(np.sqrt(across[i] * (g11 * across[i] + along) + least)) * scale)
         line = np.float32(0.0)
@@ -201,7 +244,7 @@ def _add_remainder(
             patch[j, i] = value
             line += value
         total += line
-    share = light / np.float32(max(total, 1e-30))
+    share = lamp.halo_e / np.float32(max(total, 1e-30))
     for j in range(max(top, 0), min(top + side, image.shape[0])):
         for i in range(max(left, 0), min(left + side, image.shape[1])):
             value = patch[j - top, i - left]
@@ -211,8 +254,9 @@ def _add_remainder(
 
 
 @compiled
-def _add_gaussian(image: NDArray[np.float32], x: float, y: float, sigma_px: float, energy: NDArray[np.float32]) -> None:
-    """`add_spot` at (x, y)."""
+def _add_gaussian(image: NDArray[np.float32], pixel: Array, sigma_px: float, energy: NDArray[np.float32]) -> None:
+    """`add_spot`."""
+    x, y = pixel[0], pixel[1]
     reach = math.ceil(4.5 * sigma_px) + 1
     left, top = round(x) - reach, round(y) - reach
     first_x, last_x = max(left, 0), min(left + 2 * reach + 1, image.shape[1])
@@ -236,32 +280,3 @@ def _add_gaussian(image: NDArray[np.float32], x: float, y: float, sigma_px: floa
             image[j, i, 0] += value * energy[0]
             image[j, i, 1] += value * energy[1]
             image[j, i, 2] += value * energy[2]
-
-
-@compiled
-def _add_lights(
-    image: NDArray[np.float32],
-    pixels: Array,
-    reach: int,
-    metric: Array,
-    soft: Array,
-    rows: NDArray[np.float32],
-    row: IntArray,
-    weight: NDArray[np.float32],
-    smooth: NDArray[np.float32],
-    inner_angle2: NDArray[np.float32],
-    scale: np.float32,
-    sigma: Array,
-    halo: NDArray[np.float32],
-    core: NDArray[np.float32],
-) -> None:
-    """Add to an image lamps (m,) at pixels (m, 2): halos above their smooth parts and cores, of colours (m, 3)."""
-    table = np.zeros(len(inner_angle2) + 1, dtype=np.float32)
-    for k in range(len(pixels)):
-        if max(halo[k].max(), core[k].max()) < _LEAST_E:
-            continue
-        low, high, share = rows[row[k]], rows[row[k] + 1], weight[k]
-        for i in range(len(inner_angle2)):
-            table[i] = low[i] + share * (high[i] - low[i]) - (smooth[k, 0] + smooth[k, 1] * inner_angle2[i])
-        _add_remainder(image, pixels[k, 0], pixels[k, 1], reach, metric[k], soft[k], table, scale, halo[k])
-        _add_gaussian(image, pixels[k, 0], pixels[k, 1], sigma[k], core[k])

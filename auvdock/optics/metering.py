@@ -8,9 +8,10 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.optics.flash import FlashOptics
-from auvdock.optics.scene import LitScene, View
+from auvdock.optics.scene import LitScene
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.spots import Spots
+from auvdock.optics.view import View
 
 __all__ = ["predicted_share", "veil_share"]
 
@@ -24,9 +25,9 @@ def predicted_share(
     lies off the sensor, overlap of spots and surfaces are left out; the veil counts.
     """
     shown = FlashOptics(lit).spots(view) if spots is None else spots
-    saturated_e = SensorScale(lit.cfg, 1.0).saturated_e * metered
+    saturated_e = SensorScale(lit.setup.imaging, 1.0).saturated_e * metered
     model = lit.spots
-    veil_e_s = lit.veil_e_s(-float(view.T_world_camera[2, 3]))
+    veil_e_s = lit.veil_e_s(view.depth_m)
 
     def share(sensitivity_s: float) -> float:
         level = saturated_e / sensitivity_s

@@ -63,12 +63,12 @@ class Offscreen:
         try:
             for field in kept:
                 setattr(quality, field, _COARSE[field])
-            self._gl, (self._context, name) = new_context(width_px, height_px, resources)
+            self.gl, (self._context, name) = new_context(width_px, height_px, resources)
         finally:
             for field, value in kept.items():
                 setattr(quality, field, value)
         self._process = os.getpid()
-        self.name = name or type(self._gl).__module__
+        self.name = name or type(self.gl).__module__
         """What draws: the driver's renderer, or who made the context."""
 
     @property
@@ -90,7 +90,7 @@ class Offscreen:
         width, height = self._size
         rect = mujoco.MjrRect(0, 0, width, height)
         colour = np.empty((height, width, 3), dtype=np.uint8)
-        with self._current():
+        with self.current():
             mujoco.mjr_render(rect, scene, self._context)
             mujoco.mjr_readPixels(colour, depth, rect, self._context)
         return colour
@@ -102,9 +102,9 @@ class Offscreen:
             GraphicsError: another thread is drawing with it at this moment.
         """
         if self.is_ours:
-            with self._current():
+            with self.current():
                 self._context.free()
-            self._gl.free()
+            self.gl.free()
             self._process = -1
 
     def __del__(self) -> None:
@@ -113,14 +113,14 @@ class Offscreen:
             self.close()
 
     @contextmanager
-    def _current(self) -> Generator[None]:
+    def current(self) -> Generator[None]:
         """Have the context current in this thread; what was current before is so again afterwards."""
         if not self._busy.acquire(blocking=False):
             raise GraphicsError(_BUSY)
         try:
             with ExitStack() as stack:
                 try:
-                    stack.enter_context(self._gl.as_current())
+                    stack.enter_context(self.gl.as_current())
                 except Exception as error:  # as many kinds as there are drivers
                     raise GraphicsError(_BUSY) from error
                 yield

@@ -20,19 +20,21 @@ Inside the beam sin θ is bounded by the mean distance from the rays of a Gaussi
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
+from auvdock.optics.arrival import Lamp
 from auvdock.optics.beam_spread import beam_spread
+from auvdock.optics.halo import halo_of
 from auvdock.optics.light import beam_profile
 from auvdock.optics.phase_function import wide_angle_phase
-from auvdock.optics.radiometry import LightSet, Received
+from auvdock.optics.radiometry import LightSet
+from auvdock.optics.view import Beam, Moment, View
 from auvdock.optics.water import WaterCfg
 
-__all__ = ["Beam", "RotatingLight"]
+__all__ = ["RotatingLight"]
 
 _PIECES = 10
 _NODES = 4
@@ -43,32 +45,6 @@ _AT_LAMP = 0.35
 _REACH_RAD = 1.7
 """A little more than a camera's diagonal."""
 _TURN_NODES, _TURN_WEIGHTS = np.polynomial.legendre.leggauss(3)
-
-
-class Beam(NamedTuple):
-    """The beam beside its lamp, in pieces along its image.
-
-    Attributes:
-        angle_rad: angle between the beam's axis and the line from lamp to camera.
-        ray_camera: (3,) unit direction to the lamp.
-        along_camera: (3,) unit direction, normal to that, in which the beam's image runs.
-        edge_rad: (k + 1,) borders of the pieces, apparent angle from the lamp.
-        rays_camera: (k, 3) unit directions to the pieces.
-        range_m: (k,) distances of the pieces.
-        scattering_depth: (k,) b times the path over which the light spreads.
-        light_w_m2: (k,) irradiance from each.
-        width_rad: (k,) standard deviation of the beam across, as seen from the camera.
-    """
-
-    angle_rad: float
-    ray_camera: Array
-    along_camera: Array
-    edge_rad: Array
-    rays_camera: Array
-    range_m: Array
-    scattering_depth: Array
-    light_w_m2: Array
-    width_rad: Array
 
 
 class RotatingLight:
@@ -90,12 +66,13 @@ class RotatingLight:
         self._index = np.array([lamp] if image is None else [lamp, image])
         self._flip = np.array([[1.0, 1.0, 1.0], [1.0, 1.0, -1.0]])[: len(self._index)]
         half = math.radians(cfg.divergence_deg) / 2.0
-        self._spread = beam_spread(water.scattering_angle_rad, half)
+        self._halo = halo_of(water)
+        self._spread = beam_spread(self._halo, half)
         self._theta0 = water.scattering_angle_rad
         self._sigma = half / math.sqrt(2.0 * math.log(2.0))
         self._near2 = 2.0 / math.pi * self._sigma**2
-        self._peak, self._flux = float(lights.peak_w_sr[lamp]), float(lights.flux_w[lamp])
-        self._a, self._b = float(lights.absorption_per_m[lamp]), float(lights.scattering_per_m[lamp])
+        own = Lamp.read(lights.lamps, lamp)
+        self._peak, self._flux, self._a, self._b = own.peak_w_sr, own.flux_w, own.absorption_per_m, own.scattering_per_m
         self._cos_elevation = math.cos(math.radians(cfg.elevation_deg))
         self._sin_elevation = math.sin(math.radians(cfg.elevation_deg))
 
@@ -105,35 +82,29 @@ class RotatingLight:
         level = self._cos_elevation
         return np.array([level * math.cos(azimuth), level * math.sin(azimuth), self._sin_elevation])
 
-    def shine(
-        self, received: Received, R_station_camera: Array, station_time_s: float, exposure_s: float = 0.0
-    ) -> Beam:
-        """Put the beacon's light at a station time into `received`, in place, and give what lies beside the lamp.
-
-        Args:
-            received: light of all lamps; the entries of the beacon and of its image are overwritten.
-            R_station_camera: (3, 3) rotation from the camera to the station frame.
-            station_time_s: station time of mid exposure.
-            exposure_s: the light is averaged over this time.
-        """
-        r = received.range_m[self._index]
-        back = -(received.ray_camera[self._index] @ R_station_camera.T)
+    def shine(self, view: View, moment: Moment) -> View:
+        """A step: put the beacon's light and that of its image into a view, with what lies beside the lamp."""
+        R_station_camera = view.T_station_camera[:3, :3]
+        arrivals = view.arrivals
+        r, rays = arrivals["range_m"][self._index], arrivals["ray_camera"][self._index]
+        back = -(rays @ R_station_camera.T)
         angle = np.empty((len(_TURN_NODES), len(r)))
         for k, node in enumerate(_TURN_NODES):
-            axis = self.axis(station_time_s + 0.5 * exposure_s * float(node))
+            axis = self.axis(moment.station_time_s + 0.5 * moment.exposure_s * float(node))
             angle[k] = np.arccos(np.clip((back * self._flip) @ axis, -1.0, 1.0))
         depth = self._b * r
         weight = 0.5 * _TURN_WEIGHTS
         total = self._peak * np.exp(-self._a * r) / r**2
-        core = total * np.exp(-depth) * (weight @ beam_profile(angle, self.cfg.divergence_deg))
+        arrivals["core_w_m2"][self._index] = (
+            total * np.exp(-depth) * (weight @ beam_profile(angle, self.cfg.divergence_deg))
+        )
         scattered = self._spread.share(np.broadcast_to(depth, angle.shape), angle)
-        halo = total * -np.expm1(-depth) * (weight @ scattered)
-        received.core_w_m2[self._index] = core
-        axis_camera = self.axis(station_time_s) @ R_station_camera
-        beam, at_lamp = self._beam(received.ray_camera[self.lamp], axis_camera, float(r[0]), float(halo[0]))
+        halo = total * self._halo.scattered(depth) * (weight @ scattered)
+        axis_camera = self.axis(moment.station_time_s) @ R_station_camera
+        beam, at_lamp = self._beam(rays[0], axis_camera, float(r[0]), float(halo[0]))
         halo[0] = at_lamp
-        received.halo_w_m2[self._index] = halo
-        return beam
+        arrivals["halo_w_m2"][self._index] = halo
+        return view._replace(beam=beam)
 
     def _beam(self, ray: Array, axis: Array, r: float, halo: float) -> tuple[Beam, float]:
         """The pieces along the beam, and what remains of the halo at the lamp itself."""
@@ -152,7 +123,8 @@ class RotatingLight:
         phi = edge[:-1, None] + step[:, None] * (np.arange(_NODES) + 0.5)
         opening = np.sin(apart + phi)
         s, d = r * np.sin(phi) / opening, r * math.sin(apart) / opening
-        excess = wide_angle_phase(apart + phi, self._theta0) * np.exp(-self._a * (s + d))
+        phase = wide_angle_phase((apart + phi).ravel(), self._theta0).reshape(phi.shape)
+        excess = phase * np.exp(-self._a * (s + d))
         light = self._flux * self._b / (r * math.sin(apart)) * excess.sum(axis=1) * step
         lead = float(self._spread.lead_rad(np.array([self._b * r]), np.array([angle]))[0])
         # One turn stands out only beyond what many small ones make, some θ0 b r / 2; within, the halo stays a whole.

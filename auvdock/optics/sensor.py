@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array, Image
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import SATURATED_CODE
-from auvdock.optics.light_loop import codes, contrast, noise_dn
+from auvdock.numeric.records import Records
+from auvdock.optics.meeting import CodeScale, codes, noise_dn
 from auvdock.optics.settings import ImagingCfg
 
 __all__ = ["Sensor", "SensorScale", "saturated_share"]
@@ -38,8 +39,7 @@ class SensorScale:
         full_scale_e: electrons of the greatest code.
         dn_per_root: codes per √electron.
         saturated_e: electrons at which a sample counts as saturated.
-        numbers: (5,) for `light_loop.codes`: codes per electron of the linear encoding, else 0; read noise squared,
-            read noise, codes per √electron; standard deviation of a code of the other encoding.
+        law: the same for compiled code, one row.
     """
 
     def __init__(self, cfg: ImagingCfg, gain: float) -> None:
@@ -55,24 +55,12 @@ class SensorScale:
             self.saturated_e = (SATURATED_CODE / self.dn_per_root + self.read_e) ** 2 - self._read2
         linear = 255.0 / self.full_scale_e if self._linear else 0.0
         noise_dn = math.sqrt(0.25 * self.dn_per_root**2 + 1.0 / 12.0)
-        self.numbers = np.array([linear, self._read2, self.read_e, self.dn_per_root, noise_dn])
+        scale = CodeScale(linear, self.read_e, self.dn_per_root, noise_dn, self.saturated_e)
+        self.law: Records[CodeScale] = scale.packed()
 
     def codes(self, electrons: Array) -> Array:
         """Unrounded, unclipped codes of electrons, any shape."""
-        return codes(electrons.ravel(), self.numbers).reshape(electrons.shape)
-
-    def contrast(self, own_e: Array, around_e: Array) -> tuple[Array, Array, Array]:
-        """Lights (m,) over their surroundings, in codes clipped at 255.
-
-        Args:
-            own_e: electrons of each light at its centre.
-            around_e: electrons of everything else there.
-
-        Returns:
-            (m,) code of the centre above that of the surroundings, the latter, and the standard deviation of the
-            former, quantisation included.
-        """
-        return contrast(own_e, around_e, self.numbers)
+        return codes(electrons.ravel(), self.law).reshape(electrons.shape)
 
     def electrons(self, codes: Array) -> Array:
         """Electrons of codes, any shape; inverse of `codes`."""
@@ -88,7 +76,7 @@ class SensorScale:
 
     def noise_dn(self, electrons: Array) -> Array:
         """Standard deviation of the code at a signal in electrons, quantisation included."""
-        return noise_dn(electrons.ravel(), self.numbers).reshape(electrons.shape)
+        return noise_dn(electrons.ravel(), self.law).reshape(electrons.shape)
 
 
 class Sensor:

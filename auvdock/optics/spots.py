@@ -8,14 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
-from auvdock.optics.halo import halo_table
+from auvdock.numeric.records import Records
+from auvdock.optics.arrival import Arrival
+from auvdock.optics.halo import halo_of
 from auvdock.optics.lens import Lens
-from auvdock.optics.light_loop import areas, at_distance, met, spread
-from auvdock.optics.radiometry import LightSet, Received
+from auvdock.optics.meeting import Meeting, level_at, meet, saturate
+from auvdock.optics.radiometry import LightSet
+from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
+from auvdock.optics.spread import HaloPlaces, Ring, Spot, SpreadLaw, profiles, spread
 from auvdock.optics.water import WaterCfg
 
-__all__ = ["FlashLines", "Meeting", "SpotModel", "Spots"]
+__all__ = ["FlashLines", "SpotModel", "Spots"]
 
 _RADII = 32
 
@@ -36,24 +40,18 @@ class FlashLines(NamedTuple):
     lines: Array
 
 
-class Spots:
-    """Radial profiles of the lights in view, in electrons per second and pixel.
+class Spots(NamedTuple):
+    """Radial profiles of the lights in view.
 
     Attributes:
-        core: (m,) core irradiance, W/m².
-        halo: (m,) halo irradiance, W/m².
-        sigma_px: (m,) width of the core on the sensor.
+        rows: (m,) the lights.
         profile: (m, k) irradiance per pixel at `SpotModel.radii_px`, W/m² per pixel.
-        channel: (m, 3) electrons per second for 1 W/m² on a pixel: red, green, blue.
         flash: the rotating beacon among them, None if there is none in view.
     """
 
-    __slots__ = ("channel", "core", "flash", "halo", "profile", "sigma_px")
-
-    def __init__(self, core: Array, halo: Array, sigma_px: Array, profile: Array, channel: Array) -> None:
-        """Hold the arrays."""
-        self.core, self.halo, self.sigma_px, self.profile, self.channel = core, halo, sigma_px, profile, channel
-        self.flash: FlashLines | None = None
+    rows: Records[Spot]
+    profile: Array
+    flash: FlashLines | None = None
 
 
 class SpotModel:
@@ -64,89 +62,68 @@ class SpotModel:
 
     Attributes:
         radii_px: (k,) radii at which profiles are tabulated.
-        ring_px2: (k,) area of the ring that each stands for.
-        spacing: (2,) where among them a distance is, for `light_loop.at_distance`.
-        spreading: what `light_loop.spread` takes of halo and lens.
-        channel: (n, 3) electrons per second for 1 W/m² of each light on a pixel: red, green, blue.
+        rings: (k,) the same with their areas.
+        law: how light spreads, one row.
         samples: number of the image's samples, three per pixel.
     """
 
-    def __init__(self, lens: Lens, lights: LightSet, water: WaterCfg, cfg: ImagingCfg) -> None:
-        """Tabulate the halo at fixed radii."""
-        self.radii_px = np.geomspace(0.35, 0.45 * lens.camera.width_px, _RADII)
-        edges = np.concatenate([[0.0], np.sqrt(self.radii_px[1:] * self.radii_px[:-1]), self.radii_px[-1:]])
-        self.ring_px2 = math.pi * np.diff(edges**2)
-        self.spacing = np.array([self.radii_px[0] ** 2, 0.5 / math.log(self.radii_px[1] / self.radii_px[0])])
-        table = halo_table(water.scattering_angle_rad)
-        rows = table.density_rows(self.radii_px * lens.rad_per_px) * lens.rad_per_px**2
-        # Of the core: variance by the lens, and by the lamp's face at 1 m.
-        self._widths = np.array([cfg.lens_sigma_px**2, (cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2])
-        self.spreading = rows, table.places, -0.5 * self.radii_px**2, self._widths
-        self.channel = lights.electrons_per_j * lens.aperture_m2
+    def __init__(
+        self, lens: Lens, lights: LightSet, water: WaterCfg, cfg: ImagingCfg, smoothing_px2: float = 0.0
+    ) -> None:
+        """Tabulate the halo at fixed radii.
+
+        Args:
+            lens: the camera's geometry.
+            lights: the lamps.
+            water: the water between.
+            cfg: the camera as an instrument.
+            smoothing_px2: variance per axis by which a detector smooths; the cusp of a halo is softened by half as much
+                again as the core.
+        """
+        self.lights = lights
+        radii = np.geomspace(0.35, 0.45 * lens.camera.width_px, _RADII)
+        edges = np.concatenate([[0.0], np.sqrt(radii[1:] * radii[:-1]), radii[-1:]])
+        self.radii_px: Array = radii
+        self.rings: Records[Ring] = Ring.zeros(_RADII)
+        self.rings["radius_px"], self.rings["area_px2"] = radii, math.pi * np.diff(edges**2)
+        table, lens_px2 = halo_of(water), cfg.lens_sigma_px**2
+        seen_px = np.sqrt(radii**2 + 1.5 * (lens_px2 + smoothing_px2)) if smoothing_px2 > 0.0 else radii
+        self._halo = table.density_rows(seen_px * lens.rad_per_px) * lens.rad_per_px**2
+        self.law: Records[SpreadLaw] = SpreadLaw(
+            halo=HaloPlaces.read(table.places),
+            lens_px2=lens_px2 + smoothing_px2,
+            face_px2_m2=(cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2,
+            aperture_m2=lens.aperture_m2,
+            first_px2=float(radii[0]) ** 2,
+            per_log_px2=0.5 / math.log(radii[1] / radii[0]),
+        ).packed()
+        self._law = SpreadLaw.read(self.law)
         self.samples = lens.camera.width_px * lens.camera.height_px * 3
 
     def sigma_px(self, range_m: Array) -> Array:
         """(n,) standard deviation of the core on the sensor."""
-        return np.sqrt(self._widths[0] + self._widths[1] / (range_m * range_m))
+        return np.sqrt(self._law.lens_px2 + self._law.face_px2_m2 / (range_m * range_m))
 
-    def spots(self, received: Received, index: IntArray) -> Spots:
-        """Profiles of the lights `index` (m,)."""
-        core, halo, sigma, profile, channel = spread(
-            index,
-            received.range_m,
-            received.scattering_depth,
-            received.core_w_m2,
-            received.halo_w_m2,
-            *self.spreading,
-            self.channel,
-        )
-        return Spots(core, halo, sigma, profile, channel)
+    def spread(self, arrivals: Records[Arrival], index: IntArray) -> Spots:
+        """Lights `index` (m,) of those that arrive, as spots."""
+        return Spots(*spread(index, arrivals, self.lights.lamps, self.law, self.rings, self._halo))
+
+    def profiles(self, arrivals: Records[Arrival]) -> Array:
+        """(n, k) profiles of lights (n,), 0 for those that are not on the sensor."""
+        return profiles(arrivals, self.law, self.rings, self._halo)
 
     def saturated_area_px2(self, spots: Spots, level_e_s: float) -> Array:
         """(m, 3) area of each spot above a level in electrons per second, per channel; overlap is not counted."""
-        return areas(spots.profile, spots.channel, level_e_s, self.ring_px2)
+        return saturate(spots.rows, spots.profile, self.rings, level_e_s)
 
     def share(self, area_px2: Array) -> float:
         """Share of the image's samples that areas (m, 3) are."""
         return float(np.add.reduce(area_px2, axis=None)) / self.samples
 
-    def at_distance(self, spots: Spots, distance2_px2: Array) -> Array:
-        """(m, m) irradiance per pixel at squared distances (m, m) from the lights along the second axis.
+    def level_at(self, spots: Spots, distance2_px2: Array) -> Array:
+        """(m, m) irradiance per pixel at squared distances (m, m) from the lights along the second axis."""
+        return level_at(spots.profile, distance2_px2, self.law)
 
-        Taken at the nearest tabulated radius; the radii are 22 % apart.
-        """
-        return at_distance(spots.profile, distance2_px2, self.spacing)
-
-    def meet(self, spots: Spots, pixels: Array, exposure_s: float, saturated_e: float) -> Meeting:
-        """The lights at pixels (m, 2) among each other: at each one's centre its own light and that of the others.
-
-        Args:
-            spots: the lights' profiles.
-            pixels: their places on the sensor.
-            exposure_s: exposure time.
-            saturated_e: electrons at which a sample is saturated.
-        """
-        place, own, around, radius, area, distance2 = met(
-            spots.profile, spots.channel, pixels, self.ring_px2, self.spacing, exposure_s, saturated_e
-        )
-        return Meeting(place, own, around, radius, area / self.samples, distance2)
-
-
-class Meeting(NamedTuple):
-    """Lights on the sensor as they are seen beside each other.
-
-    Attributes:
-        channel: (m,) in which each is brightest: 0 red, 1 green, 2 blue.
-        own_e: (m,) electrons of its own light at its centre, in that channel.
-        around_e: (m,) electrons of all others' light there.
-        radius_px: (m,) radius of the disc that it saturates.
-        share: share of the image's samples that are saturated; overlap is not counted.
-        distance2_px2: (m, m) squared distances between them.
-    """
-
-    channel: IntArray
-    own_e: Array
-    around_e: Array
-    radius_px: Array
-    share: float
-    distance2_px2: Array
+    def meet(self, spots: Spots, scale: SensorScale, exposure_s: float, behind_e_s: Array) -> Meeting:
+        """The lights among each other, before `behind_e_s` (3,) electrons per second and pixel."""
+        return meet(spots.rows, spots.profile, self.law, self.rings, scale.law, behind_e_s, exposure_s)

@@ -54,7 +54,7 @@ class Surfaces:
         half_x, half_y = (1.02 * float(np.abs(tangents[:, :, k]).max()) for k in range(2))
         width = round(columns * half_x / float(np.abs(tangents[rows // 2, :, 0]).max()))
         height = round(rows * half_y / float(np.abs(tangents[:, columns // 2, 1]).max()))
-        self._renderer = StaticRenderer(model, width, height, half_x, half_y, hidden_geoms)
+        self.renderer = StaticRenderer(model, width, height, half_x, half_y, hidden_geoms)
         map_x = (tangents[:, :, 0] / half_x + 1.0) * 0.5 * width - 0.5
         # The renderer's rows run from the bottom up.
         map_y = (1.0 - tangents[:, :, 1] / half_y) * 0.5 * height - 0.5
@@ -64,8 +64,6 @@ class Surfaces:
         self._nearest = cv2.convertMaps(map_x, map_y, cv2.CV_16SC2, nninterpolation=True)
         self._stretch = np.sqrt(1.0 + np.sum(tangents**2, axis=2)).astype(np.float32)
         self._rays = np.ascontiguousarray(lens.rays.T, dtype=np.float32)
-        self.distance: NDArray[np.float32] | None = None
-        """Distance along the rays of the lens' coarse grid (rows, columns) in the last image; `inf` for nothing."""
 
         water = lit.water
         self._beta_direct = water.attenuation
@@ -73,74 +71,73 @@ class Surfaces:
         solid = cv2.resize(lens.solid_angle_sr.astype(np.float32), (columns, rows), interpolation=cv2.INTER_LINEAR)
         self._solid_angle = np.repeat(solid[:, :, None], 3, axis=2)
 
-        light = Illumination(lit)
-        self._lamps, self._spill_w_sr = light.lamps_m, light.spill_w_sr
-        self._lamp_absorption = light.absorption_per_m
-        self._geoms = _Geoms(model)
-        nearest = np.array([self._geoms.distance_m(lamp) for lamp in self._lamps]).T
-        loss = np.exp(-self._lamp_absorption * nearest) / np.maximum(nearest**2, _GLARE_M2)
-        self._lamp_irradiance = loss @ self._spill_w_sr
+        self.light = Illumination(lit)
+        self.geoms = _Geoms(model)
+        nearest = np.array([self.geoms.distance_m(lamp) for lamp in self.light.lamps_m]).T
+        loss = np.exp(-self.light.absorption_per_m * nearest) / np.maximum(nearest**2, _GLARE_M2)
+        self._lamp_irradiance = loss @ self.light.spill_w_sr
         # A vehicle that looks for a rotating beacon is far from the lamps for long, and the floor below it is dark.
-        self._planes = self._geoms.planes if lit.rotating is not None else np.zeros(0, dtype=np.int64)
+        self._planes = self.geoms.planes if lit.rotating is not None else np.zeros(0, dtype=np.int64)
         self._lamp_to_plane = nearest[self._planes]
 
     def close(self) -> None:
         """Free OpenGL's context."""
-        self._renderer.close()
+        self.renderer.close()
 
     def visible(self, position_world_m: Array, sensitivity_s: float) -> bool:
         """Whether any surface can stand out of the noise, in the most favourable case, from a position (3,)."""
         daylight = self._lit.daylight_w_m2(-float(position_world_m[2]))
-        distance = self._geoms.distance_m(position_world_m)
+        distance = self.geoms.distance_m(position_world_m)
         through = np.exp(-distance[:, None] * self._beta_direct)
         irradiance = self._lamp_irradiance + daylight
         if self._lit.lamp is not None:
             irradiance = irradiance + self._lit.lamp.brightest(distance)
         per_pixel = self._lit.electrons_per_j.T * (sensitivity_s * self._lit.lens.rad_per_px**2)
         veil = float(self._lit.veil_e_s(-float(position_world_m[2])).max()) * sensitivity_s
-        noise = math.sqrt(self._lit.cfg.read_noise_e**2 + veil)
+        noise = math.sqrt(self._lit.setup.imaging.read_noise_e**2 + veil)
         brightest: Array = ((irradiance * through * _GREATEST_RADIANCE) @ per_pixel).max(axis=1)
         shown: BoolArray = np.greater(brightest, noise)
         doubtful = shown[self._planes].any()
         if np.count_nonzero(shown) > np.count_nonzero(shown[self._planes]) or not doubtful:
             return bool(shown.any())
-        radiance = self._plane_radiance(position_world_m, distance[self._planes], daylight, through[self._planes])
+        radiance = self.plane_radiance(position_world_m, distance[self._planes], daylight, through[self._planes])
         return float((radiance @ per_pixel).max()) > noise
 
-    def _plane_radiance(self, position_world_m: Array, height: Array, daylight: Array, through: Array) -> Array:
+    def plane_radiance(self, position_world_m: Array, height: Array, daylight: Array, through: Array) -> Array:
         """(n, 3) upper bound of each plane's radiance through water, tighter than that of its nearest point.
 
         A point at d from a lamp lies D - d from the camera or farther, D being the camera's distance from that lamp, so
         that its light has come a way of D at least: max over d of E(d) e^{-β max(D - d, h)}, in steps of d in which
         each factor is taken at the end where it is greater; h is the camera's distance from the plane.
         """
-        away = np.linalg.norm(self._lamps - position_world_m, axis=1)
+        away = np.linalg.norm(self.light.lamps_m - position_world_m, axis=1)
         bound = _plane_bound(
-            away, self._lamp_to_plane, height, self._lamp_absorption, self._beta_direct, self._spill_w_sr
+            away, self._lamp_to_plane, height, self.light.absorption_per_m, self._beta_direct, self.light.spill_w_sr
         )
         irradiance = bound + daylight * through
         if self._lit.lamp is not None:
             irradiance = irradiance + self._lit.lamp.brightest(height) * through
         return irradiance * _GREATEST_RADIANCE
 
-    def electrons(self, T_world_camera: Array, exposure_s: float) -> NDArray[np.float32]:
-        """Electrons (h, w, 3) per image pixel, red, green, blue, at this resolution.
+    def electrons(self, T_world_camera: Array, exposure_s: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Electrons (h, w, 3) per image pixel, red, green, blue, at this resolution, and distances as `radiance` gives.
 
         Raises:
             GraphicsError: no OpenGL context can be had.
         """
-        image = cv2.transform(
-            self.radiance(T_world_camera), (self._lit.electrons_per_j * exposure_s).astype(np.float32)
-        )
-        return np.asarray(cv2.multiply(image, self._solid_angle, image), dtype=np.float32)
+        radiance, distance = self.radiance(T_world_camera)
+        image = cv2.transform(radiance, (self._lit.electrons_per_j * exposure_s).astype(np.float32))
+        return np.asarray(cv2.multiply(image, self._solid_angle, image), dtype=np.float32), distance
 
-    def radiance(self, T_world_camera: Array) -> NDArray[np.float32]:
-        """Radiance per band (h, w, 3) in W/(m² sr), blue, green, red, at this resolution.
+    def radiance(self, T_world_camera: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Radiance per band (h, w, 3) in W/(m² sr), blue, green, red, at this resolution, and what distance it is from.
+
+        The distance (rows, columns) is along the rays of the lens' coarse grid; `inf` for nothing.
 
         Raises:
             GraphicsError: no OpenGL context can be had.
         """
-        colour, depth = self._renderer.render(T_world_camera)
+        colour, depth = self.renderer.render(T_world_camera)
         # OpenCV reads four channels of 8 bits a third faster than three.
         colour = cv2.cvtColor(colour, cv2.COLOR_RGB2BGRA)
         colour = cv2.remap(colour, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -151,7 +148,9 @@ class Surfaces:
         veil = self._lit.veil_w_m2_sr(depth_m)
         # Beyond this nothing but veil is left, and e^x would run into slow denormal numbers.
         np.minimum(distance, np.float32(80.0 / max(float(self._beta_direct.max()), 0.1)), out=distance)
-        light = self._light(T_world_camera, distance, daylight)
+        size = self._lit.lens.shape[::-1]
+        coarse = np.asarray(cv2.resize(distance, size, interpolation=cv2.INTER_NEAREST), dtype=np.float32)
+        light = self._light(T_world_camera, coarse, daylight)
         light = cv2.resize(light, (self.shape[1], self.shape[0]), interpolation=cv2.INTER_LINEAR)
         albedo = cv2.cvtColor(colour, cv2.COLOR_BGRA2BGR).astype(np.float32)
         scene = cv2.multiply(albedo, light, albedo, scale=1.0 / (255.0 * math.pi))
@@ -159,15 +158,13 @@ class Surfaces:
         if veil.max() > 0.0:
             lost = _exponential(distance, -self._beta_veil)
             image += cv2.transform(lost, np.column_stack([np.diag(-veil), veil]).astype(np.float32))
-        return image
+        return image, coarse
 
     def _light(self, T_world_camera: Array, distance: NDArray[np.float32], daylight: Array) -> NDArray[np.float32]:
         """Lamps' light and daylight (rows, columns, 3) on what is seen, per band, on the coarse grid of the lens."""
-        rows, columns = self._lit.lens.shape
-        coarse = cv2.resize(distance, (columns, rows), interpolation=cv2.INTER_NEAREST)
-        self.distance = np.asarray(coarse, dtype=np.float32)
-        z = self.distance.ravel()
-        lamps = (self._lamps - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
+        rows, columns = distance.shape
+        z = distance.ravel()
+        lamps = (self.light.lamps_m - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
         light = np.empty((3, len(z)), dtype=np.float32)
         light[:] = daylight[:, None]
         add_spilled(
@@ -175,8 +172,8 @@ class Surfaces:
             self._rays,
             z,
             lamps.astype(np.float32),
-            self._lamp_absorption.astype(np.float32),
-            self._spill_w_sr.astype(np.float32),
+            self.light.absorption_per_m.astype(np.float32),
+            self.light.spill_w_sr.astype(np.float32),
             np.float32(LAMP_M2),
         )
         if self._lit.lamp is not None:
@@ -194,7 +191,7 @@ def _exponential(distance: NDArray[np.float32], per_m: Array) -> NDArray[np.floa
 def _plane_bound(
     away: Array, lamp_to_plane: Array, height: Array, absorption: Array, beta: Array, spill_w_sr: Array
 ) -> Array:
-    """(n, 3) greatest lamp light that planes (n,) at `height` show per band, see `Surfaces._plane_radiance`."""
+    """(n, 3) greatest lamp light that planes (n,) at `height` show per band, see `Surfaces.plane_radiance`."""
     bound = np.zeros((len(height), 3))
     for plane in range(len(height)):
         for lamp in range(len(away)):

@@ -15,8 +15,8 @@ from auvdock.core.contracts import Detector, Frame, RegionOfInterest, TagDetecti
 from auvdock.core.landing_station import LandingStationCfg
 from auvdock.optics.detection_fit import Observation
 from auvdock.optics.ground import Ground
-from auvdock.optics.landing_camera import LandingCamera
-from auvdock.optics.sensing import candidates_in_view
+from auvdock.optics.imaging import UnderwaterCamera
+from auvdock.optics.sensing import meet
 from auvdock.optics.tag_model import TagModelCfg, TagSight, inward, tag_chance, tag_sight
 
 __all__ = ["TagObservation", "TagSeer", "fit_tag_model", "observe_landing"]
@@ -49,7 +49,7 @@ class TagObservation:
 
 
 def observe_landing(
-    camera: LandingCamera,
+    camera: UnderwaterCamera,
     station: LandingStationCfg,
     lights: Detector,
     tags: TagSeer,
@@ -72,10 +72,10 @@ def observe_landing(
         camera.reset(rng.spawn(1)[0])
         shot = camera.take(pose, 0.0)
         view = shot.view
-        spots = lit.spots.spots(view.received, view.inside.nonzero()[0])
+        spots = lit.spots.spread(view.arrivals, view.inside.nonzero()[0])
         below = np.median(ground.electrons_per_s(view.T_world_camera), axis=0)
-        seen, _ = candidates_in_view(lit, view, spots, shot.exposure_s, shot.gain, ground_e_s=below)
-        if len(seen.flux):
+        seen, _ = meet(lit, view, spots, shot.exposure_s, shot.gain, ground_e_s=below)
+        if len(seen.lights):
             seen_lights.append(Observation(seen, lights.detect(shot.frame), size))
         tag_view = scene.look(view)
         sight = None if tag_view is None else tag_sight(tag_view, lit, shot.exposure_s, shot.gain)

@@ -16,7 +16,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.transforms import invert
 from auvdock.numeric.constants import TAG_CELLS
 from auvdock.optics.tag_pattern import reflectances
-from auvdock.optics.tag_pixels import add_tag
+from auvdock.optics.tag_pixels import TagLight, add_tag
 from auvdock.optics.tag_scene import TagScene
 
 __all__ = ["TagImage"]
@@ -36,7 +36,7 @@ class TagImage:
         self.scene = scene
         self._cells = reflectances(scene.tag)
         self._covered = np.where(self._cells > 0.0, np.float32(_COVER), np.float32(0.0))
-        camera, cfg = scene.lit.camera, scene.lit.cfg
+        camera, cfg = scene.lit.camera, scene.lit.setup.imaging
         self._size = (camera.width_px, camera.height_px)
         # A pixel averages over its own width: variance 1/12.
         self._sigma_px = math.sqrt(cfg.lens_sigma_px**2 + 1.0 / 12.0)
@@ -85,9 +85,11 @@ class TagImage:
             back.astype(np.float32),
             self._covered if hidden else self._cells,
             self._blur_cells(plane, back),
-            _widened(unit, width),
-            _widened(veil, width) if veil is not None else _NOTHING,
-            *(self._below(surfaces, region) if surfaces is not None else (_NOTHING, 1.0, (0.0, 0))),
+            TagLight(
+                _widened(unit, width),
+                _widened(veil, width) if veil is not None else _NOTHING,
+                *(self._below(surfaces, region) if surfaces is not None else (_NOTHING, 1.0, 0.0, 0)),
+            ),
         )
 
     def _lens_map(self) -> NDArray[np.float32]:
@@ -153,7 +155,7 @@ class TagImage:
 
     def _below(
         self, coarse: NDArray[np.float32], region: tuple[int, int, int, int]
-    ) -> tuple[NDArray[np.float32], float, tuple[float, int]]:
+    ) -> tuple[NDArray[np.float32], float, float, int]:
         """Part of a coarser image (h, w, 3) that holds a region, its columns enlarged as `cv2.resize` would.
 
         With it come its rows per row of the image, its row at the region's first, and the region's first column in it.
@@ -164,7 +166,7 @@ class TagImage:
         left, top = max(x0 // step - 1, 0), max(y0 // step - 1, 0)
         part = coarse[top : -(-y1 // step) + 1, left : -(-x1 // step) + 1]
         wide = cv2.resize(part, (part.shape[1] * step, len(part)), interpolation=cv2.INTER_LINEAR)
-        return np.asarray(wide, dtype=np.float32), 1.0 / step, ((y0 + 0.5) / step - 0.5 - top, x0 - left * step)
+        return np.asarray(wide, dtype=np.float32), 1.0 / step, (y0 + 0.5) / step - 0.5 - top, x0 - left * step
 
 
 def _widened(knots: Array, width: int) -> NDArray[np.float32]:

@@ -120,7 +120,7 @@ def tag_sight(view: TagView, lit: LitScene, exposure_s: float, gain: float) -> T
     noise = float(np.linalg.norm(scale.noise_dn(levels.mean(axis=0)) * _LUMA))
     share = float(np.interp(0.5 * (codes[0] + codes[-1]), codes, _SHARES))
     # A pixel averages over its own width: variance 1/12.
-    blur = math.sqrt(lit.cfg.lens_sigma_px**2 + 1.0 / 12.0)
+    blur = math.sqrt(lit.setup.imaging.lens_sigma_px**2 + 1.0 / 12.0)
     spread = -blur * float(ndtri(min(max(share, 1e-3), 1.0 - 1e-3)))
     return TagSight(corners, view.cell_px, float(codes[-1] - codes[0]) / noise, spread, view.inside)
 

@@ -7,6 +7,8 @@ function and B the cells. Most pixels are farther than 4.5 σ from all edges: th
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
@@ -14,11 +16,31 @@ from scipy.special import ndtr
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import TAG_CELLS
 
-__all__ = ["add_tag"]
+__all__ = ["TagLight", "add_tag"]
 
 _REACH_SIGMAS = 4.5
 _PER_SIGMA = 256
 _NORMAL = ndtr(np.arange(-_REACH_SIGMAS, _REACH_SIGMAS + 2.0 / _PER_SIGMA, 1.0 / _PER_SIGMA)).astype(np.float32)
+
+
+class TagLight(NamedTuple):
+    """Light on a region of the image that shows the tag, and what the tag hides; electrons.
+
+    Attributes:
+        unit: (k, w, 3) per unit of reflectance, at rows in the middle of each of k parts of the region.
+        veil: (k, w, 3) of the veil, or of no rows.
+        below: (m, n, 3) of what the tag hides, or of no rows.
+        below_step: its rows per row of the image.
+        below_row: its row at the region's first row.
+        below_column: its first column that belongs to the region.
+    """
+
+    unit: NDArray[np.float32]
+    veil: NDArray[np.float32]
+    below: NDArray[np.float32]
+    below_step: float
+    below_row: float
+    below_column: int
 
 
 @compiled
@@ -29,11 +51,7 @@ def add_tag(
     homography: NDArray[np.float32],
     cells: NDArray[np.float32],
     sigma: tuple[float, float],
-    unit: NDArray[np.float32],
-    veil: NDArray[np.float32],
-    below: NDArray[np.float32],
-    below_step: float,
-    below_origin: tuple[float, int],
+    light: TagLight,
 ) -> None:
     """Add unit × reflectance + (veil - below) × coverage to a region of an image (H, W, 3), electrons.
 
@@ -44,17 +62,13 @@ def add_tag(
         homography: (3, 3) tangents to u and v, in cells.
         cells: (12, 12) reflectances with a frame of zeros.
         sigma: standard deviations of the blur along u and v, in cells.
-        unit: (k, w, 3) electrons per unit of reflectance, at rows in the middle of each of k parts of the region.
-        veil: (k, w, 3) electrons of the veil, or of no rows.
-        below: (m, n, 3) electrons of what the tag hides, or of no rows.
-        below_step: its rows per row of the image.
-        below_origin: its row at the region's first row, and its first column that belongs to the region.
+        light: on the region.
     """
+    unit, veil, below = light.unit, light.veil, light.below
     x0, y0, x1, y1 = region
     width = x1 - x0
-    first_row, first_column = below_origin
     u, v = np.empty(width, dtype=np.float32), np.empty(width, dtype=np.float32)
-    light, cover = np.empty(3 * width, dtype=np.float32), np.empty(3 * width, dtype=np.float32)
+    paint, cover = np.empty(3 * width, dtype=np.float32), np.empty(3 * width, dtype=np.float32)
     line = np.empty(3 * width, dtype=np.float32)
     for y in range(y0, y1):
         right, ahead = tangents[0, y][x0:x1], tangents[1, y][x0:x1]
@@ -63,19 +77,19 @@ def add_tag(
             scale = np.float32(1.0) / (homography[2, 0] * a + homography[2, 1] * b + homography[2, 2])
             u[i] = (homography[0, 0] * a + homography[0, 1] * b + homography[0, 2]) * scale
             v[i] = (homography[1, 0] * a + homography[1, 1] * b + homography[1, 2]) * scale
-        _reflect(light, cover, u, v, cells, np.float32(sigma[0]), np.float32(sigma[1]))
+        _reflect(paint, cover, u, v, cells, np.float32(sigma[0]), np.float32(sigma[1]))
         part = (y - y0 + 0.5) * len(unit) / (y1 - y0) - 0.5
         # Along flat rows, since only such loops become vector instructions.
         out = image[y].ravel()[3 * x0 : 3 * x1]
         _between(line, unit, part, 0)
         for i in range(len(out)):
-            out[i] += line[i] * light[i]
+            out[i] += line[i] * paint[i]
         if len(veil) > 0:
             _between(line, veil, part, 0)
             for i in range(len(out)):
                 out[i] += line[i] * cover[i]
         if len(below) > 0:
-            _between(line, below, first_row + (y - y0) * below_step, first_column)
+            _between(line, below, light.below_row + (y - y0) * light.below_step, light.below_column)
             for i in range(len(out)):
                 out[i] -= line[i] * cover[i]
 

@@ -12,8 +12,9 @@ from auvdock.core.landing_station import TagCfg
 from auvdock.core.transforms import invert
 from auvdock.numeric.constants import TAG_SQUARE_CELLS
 from auvdock.optics.illumination import Illumination
-from auvdock.optics.scene import LitScene, View
+from auvdock.optics.scene import LitScene
 from auvdock.optics.tag_pattern import BLACK_SHARE, corners_station_m, tag_to_station
+from auvdock.optics.view import View
 
 __all__ = ["TagScene", "TagView"]
 
@@ -48,16 +49,16 @@ class TagScene:
         """Precompute where it lies."""
         self.lit, self.tag = lit, tag
         self.light = Illumination(lit)
-        self.cells_to_world = lit.T_world_station[:3, :3] @ tag_to_station(tag)
-        self.cells_to_world[:, 2] += lit.T_world_station[:3, 3]
-        self.normal_world: Array = lit.T_world_station[:3, 2].copy()
+        self.cells_to_world = lit.setup.T_world_station[:3, :3] @ tag_to_station(tag)
+        self.cells_to_world[:, 2] += lit.setup.T_world_station[:3, 3]
+        self.normal_world: Array = lit.setup.T_world_station[:3, 2].copy()
         self.centre_world = self.to_world(corners_station_m(tag)).mean(axis=0)
         self._corners = self.to_world(corners_station_m(tag))
         self._outline = self.to_world(corners_station_m(tag, margin_cells=1.0))
 
     def to_world(self, points_station: Array) -> Array:
         """(n, 3) points of the station frame in the world."""
-        return points_station @ self.lit.T_world_station[:3, :3].T + self.lit.T_world_station[:3, 3]
+        return points_station @ self.lit.setup.T_world_station[:3, :3].T + self.lit.setup.T_world_station[:3, 3]
 
     def height_m(self, T_world_camera: Array) -> float:
         """Height of the camera above the tag's plane."""
@@ -111,14 +112,13 @@ class TagScene:
 
     def _halos_e_s(self, view: View, ray_camera: Array) -> Array:
         """(3,) light of the lamps' halos and cores in the direction of the tag, on the sensor or off it."""
-        received, model = view.received, self.lit.spots
-        lit = np.flatnonzero((received.halo_w_m2 + received.core_w_m2 > 0.0) & (received.ray_camera[:, 2] > 0.0))
+        lit, model = np.flatnonzero(view.in_sight), self.lit.spots
         if len(lit) == 0:
             return np.zeros(3)
-        spots = model.spots(received, lit)
-        angle = np.arccos(np.clip(received.ray_camera[lit] @ ray_camera, -1.0, 1.0))
+        spots = model.spread(view.arrivals, lit)
+        angle = np.arccos(np.clip(view.arrivals["ray_camera"][lit] @ ray_camera, -1.0, 1.0))
         radius_px = np.clip(angle / self.lit.lens.rad_per_px, model.radii_px[0], model.radii_px[-1])
         level = np.array(
             [np.interp(radius, model.radii_px, row) for radius, row in zip(radius_px, spots.profile, strict=True)]
         )
-        return level @ spots.channel
+        return level @ spots.rows["channel"].copy()

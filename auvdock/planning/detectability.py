@@ -86,9 +86,9 @@ class Detectability:
     def _chunk(self, points_m: Array) -> Sighting:
         sight, k = self.sight, len(self.sight.array)
         exposure_cfg = sight.imaging.exposure
-        arriving = sight.arriving(points_m)
-        pixels, inside = sight.on_sensor(points_m, arriving.offset_m)
-        profile = sight.profiles(arriving, inside)
+        arrivals, shape = sight.look(points_m), (len(points_m), sight.lights.count)
+        pixels, inside = arrivals["pixel"].reshape(*shape, 2), arrivals["inside"].reshape(shape)
+        profile = sight.profiles(arrivals)
         sensitivity = sight.sensitivity_s(profile, pixels)
         exposure = np.minimum(sensitivity, exposure_cfg.max_s if exposure_cfg.automatic else math.inf)
         gain = np.maximum(sensitivity / exposure, 1.0)
@@ -101,7 +101,7 @@ class Detectability:
             noise,
             self.threshold,
         )
-        width = sight.spots.sigma_px(arriving.range_m[:, sight.array])
+        width = sight.spots.sigma_px(arrivals["range_m"].reshape(shape)[:, sight.array])
         contrast = contrast[:, :k]
         spread = self.model.centre_at_100 * width * (100.0 / np.maximum(contrast, 1.0)) ** 2
         sigma = np.sqrt(self.model.centre_floor_px**2 + spread**2 + _CENTRE_FLOOR_PX**2)

@@ -18,13 +18,8 @@ def position_sigma_m(sees: Detectability, points_m: Array, sighting: Sighting) -
     its centre. Lens distortion is left out: it scales J by less than the uncertainty of σ.
     """
     sight = sees.sight
-    ahead = sight.target_m - points_m
-    ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
-    right = np.column_stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))])
-    length = np.linalg.norm(right, axis=1, keepdims=True)
-    right = np.where(length > 1e-6, right / np.maximum(length, 1e-12), np.array([0.0, 1.0, 0.0]))
-    rotation = np.stack([right, np.cross(ahead, right), ahead], axis=1)
-    lights = sight.lights.positions_m[sight.array]
+    rotation = sight.frames(points_m)
+    lights = sight.lights.lamps["place_m"][sight.array]
     q = np.einsum("mij,mnj->mni", rotation, lights[None] - points_m[:, None])
     z = np.maximum(q[:, :, 2], 1e-3)
     x, y = q[:, :, 0] / z, q[:, :, 1] / z

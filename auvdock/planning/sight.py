@@ -1,31 +1,29 @@
-"""What a camera that looks at the station sees from many places at once: radiometry, exposure and spots, vectorised.
+"""What a camera that looks at the station sees from thousands of places at once.
 
-It is the model of the renderer and of the `beacons` fidelity, from the same lamps, water, halo table, lens, sensor and
-detector model; `optics.radiometry` and `optics.sensing` compute one pose at a time, this computes thousands. The camera
-points at the array's centroid and is level.
+Light arrives and spreads as it does for the renderer and the `beacons` fidelity; exposure and what spots add up to are
+vectorised over places. The camera points at the array's centroid and is level.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.arrays import Array
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.camera import Camera
-from auvdock.optics.halo import halo_table
+from auvdock.numeric.records import Records
+from auvdock.optics.arrival import Arrival
 from auvdock.optics.lens import Lens
-from auvdock.optics.light import beam_profile
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.spots import SpotModel
 from auvdock.optics.water import WaterCfg
 
-__all__ = ["Arriving", "Sight"]
+__all__ = ["Sight"]
 
 Floats = NDArray[np.float32]
 _BINS = 260
@@ -35,36 +33,10 @@ SMOOTHING_PX2 = 0.4
 """Variance, per axis, of the 3 × 3 smoothing that the detector begins with and of the pixel's own area."""
 
 
-@dataclass(frozen=True, eq=False)
-class Arriving:
-    """Light of n lamps at m camera places.
-
-    Attributes:
-        offset_m: (m, n, 3) from camera to lamp, station frame.
-        range_m: (m, n).
-        scattering_depth: (m, n) b r.
-        core_w_m2: (m, n) unscattered irradiance.
-        halo_w_m2: (m, n) forward-scattered irradiance.
-    """
-
-    offset_m: Array
-    range_m: Array
-    scattering_depth: Array
-    core_w_m2: Array
-    halo_w_m2: Array
-
-
 class Sight:
     """Camera, water and lamps, ready to be asked from anywhere."""
 
-    def __init__(
-        self,
-        camera: Camera,
-        water: WaterCfg,
-        layout: BeaconLayout,
-        imaging: ImagingCfg,
-        lights: LightSet | None = None,
-    ) -> None:
+    def __init__(self, camera: Camera, water: WaterCfg, layout: BeaconLayout, imaging: ImagingCfg) -> None:
         """Precompute tables.
 
         Args:
@@ -72,78 +44,44 @@ class Sight:
             water: what lies between.
             layout: the station's lamps.
             imaging: the camera as an instrument.
-            lights: the lamps of `layout` in `water`, if they are at hand.
         """
-        self.lights = lights if lights is not None else LightSet(layout, water)
+        self.lights = LightSet(layout, water)
         self.array = np.array(layout.indices("array"))
         self.target_m = layout.array_positions_m.mean(axis=0)
         self.camera, self.imaging = camera, imaging
         self.lens = Lens(camera, imaging)
         self.spots = SpotModel(self.lens, self.lights, water, imaging)
+        self._smoothed = SpotModel(self.lens, self.lights, water, imaging, SMOOTHING_PX2)
         self.scale = SensorScale(imaging, 1.0)
-        table = halo_table(water.scattering_angle_rad)
-        self._table = table
-        # Lens and detector smooth: the cusp of a halo is softened by half as much again as the renderer softens it.
-        smooth2 = imaging.lens_sigma_px**2 + SMOOTHING_PX2
-        angle = np.sqrt(self.spots.radii_px**2 + 1.5 * smooth2) * self.lens.rad_per_px
-        self._rows = (table.density_rows(angle) * self.lens.rad_per_px**2).astype(np.float32)
-        self._minus_half_r2 = (-0.5 * self.spots.radii_px**2).astype(np.float32)
-        self.channel = self.lights.electrons_per_j * self.lens.aperture_m2
-        self._beam_deg = [beacon.beam_angle_deg for beacon in layout.beacons]
-        rim = layout.array_positions_m
-        self._rim_x = float(np.mean(rim[:, 0]))
-        self._rim_centre = rim[:, 1:].mean(axis=0)
-        self._rim_radius2 = float(np.max(np.sum((rim[:, 1:] - self._rim_centre) ** 2, axis=1)))
+        self.channel = self.lights.column("electrons_per_j") * self.lens.aperture_m2
         self.blue = np.flatnonzero(self.channel.argmax(axis=1) == 2)
         nm = np.array([beacon.wavelength_nm for beacon in layout.beacons])
         self._colours = [np.flatnonzero(nm == value) for value in np.unique(nm)]
         self._log_first = math.log(float(self.spots.radii_px[0]))
         self._log_step = math.log(float(self.spots.radii_px[1] / self.spots.radii_px[0]))
 
-    def arriving(self, points_m: Array) -> Arriving:
-        """Core and halo irradiance of all lamps at camera places (m, 3); equal to `LightSet.received` pose by pose."""
-        lights = self.lights
-        offset = lights.positions_m[None] - points_m[:, None]
-        r = np.sqrt(np.maximum(np.einsum("mni,mni->mn", offset, offset), 1e-4))
-        cosine = -np.einsum("mni,ni->mn", offset, lights.axes) / r
-        angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-        total = lights.peak_w_sr * np.exp(-lights.absorption_per_m * r) / (r * r)
-        for index in range(lights.count):
-            total[:, index] *= self._beam(index, angle[:, index])
-        total[self._hidden(points_m)] = 0.0
-        depth = lights.scattering_per_m * r
-        core = total * np.exp(-depth)
-        return Arriving(offset, r, depth, core, total - core)
-
-    def on_sensor(self, points_m: Array, offset_m: Array) -> tuple[Array, BoolArray]:
-        """Pixels (m, n, 2) of the lamps and whether their centres fall on the sensor (m, n)."""
+    def frames(self, points_m: Array) -> Array:
+        """(m, 3, 3) right, down and ahead of a level camera at places (m, 3) that looks at the array, station frame."""
         ahead = self.target_m - points_m
-        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
+        ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
         right = np.column_stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))])
         length = np.linalg.norm(right, axis=1, keepdims=True)
         # Straight above or below there is no level camera; any roll is as good as another.
         right = np.where(length > 1e-6, right / np.maximum(length, 1e-12), np.array([0.0, 1.0, 0.0]))
-        down = np.cross(ahead, right)
-        frame = np.stack([right, down, ahead], axis=1)
-        rays = np.einsum("mij,mnj->mni", frame, offset_m)
-        rays /= np.maximum(np.linalg.norm(rays, axis=2, keepdims=True), 1e-9)
-        pixels, inside = self.lens.locate(rays.reshape(-1, 3))
-        inside &= rays.reshape(-1, 3)[:, 2] > 0.0
-        return pixels.reshape(*rays.shape[:2], 2), inside.reshape(rays.shape[:2])
+        return np.stack([right, np.cross(ahead, right), ahead], axis=1)
 
-    def profiles(self, arriving: Arriving, inside: BoolArray) -> Floats:
-        """(m, n, k) irradiance per pixel at `SpotModel.radii_px`; 0 for lamps that are not on the sensor."""
-        row, weight = self._table.row_of(arriving.scattering_depth.ravel())
-        shape = (*arriving.range_m.shape, len(self._minus_half_r2))
-        lower = self._rows[row]
-        profile = lower + (self._rows[row + 1] - lower) * weight.astype(np.float32)[:, None]
-        profile *= arriving.halo_w_m2.ravel().astype(np.float32)[:, None]
-        sigma2 = (self.spots.sigma_px(arriving.range_m.ravel()) ** 2 + SMOOTHING_PX2).astype(np.float32)
-        gauss = np.exp(self._minus_half_r2 / sigma2[:, None])
-        gauss *= (arriving.core_w_m2.ravel() / (2.0 * math.pi * sigma2)).astype(np.float32)[:, None]
-        profile += gauss
-        profile *= inside.ravel()[:, None]
-        return np.asarray(profile, dtype=np.float32).reshape(shape)
+    def look(self, points_m: Array) -> Records[Arrival]:
+        """(m n,) the light of all n lamps at camera places (m, 3), place by place."""
+        T_station_camera = np.zeros((len(points_m), 4, 4))
+        T_station_camera[:, :3, :3] = np.swapaxes(self.frames(points_m), 1, 2)
+        T_station_camera[:, :3, 3], T_station_camera[:, 3, 3] = points_m, 1.0
+        return self.lights.arrive_everywhere(T_station_camera, self.lens.projection)
+
+    def profiles(self, arrivals: Records[Arrival]) -> Floats:
+        """(m, n, k) irradiance per pixel at `SpotModel.radii_px` as the detector smooths it; 0 off the sensor."""
+        return (
+            self._smoothed.profiles(arrivals).astype(np.float32).reshape(-1, self.lights.count, len(self.spots.rings))
+        )
 
     def sensitivity_s(self, profile: Floats, pixels: Array) -> Array:
         """(m,) exposure time × gain on which the auto-exposure settles.
@@ -160,7 +98,7 @@ class Sight:
         low, high = exposure.min_s, exposure.max_s * exposure.max_gain
         gap2 = np.sum((pixels[:, :, None] - pixels[:, None]) ** 2, axis=3).astype(np.float32)
         radii = self.spots.radii_px[_EVERY]
-        area = np.add.reduceat(self.spots.ring_px2, np.arange(0, rings, 2))
+        area = np.add.reduceat(self.spots.rings["area_px2"], np.arange(0, rings, 2))
         level = np.zeros((m, n, len(radii)), dtype=np.float32)
         sharing = np.zeros_like(level)
         lit = profile[:, :, 0] > 0.0
@@ -238,21 +176,3 @@ class Sight:
         upper *= place
         upper += lower
         return upper
-
-    def _beam(self, index: int, angle: Array) -> Array:
-        return beam_profile(angle, self._beam_deg[index])
-
-    def _hidden(self, points_m: Array) -> BoolArray:
-        """(m, n) lamps inside the funnel that its rim hides: the rule of `LightSet`."""
-        positions = self.lights.positions_m
-        setback = self._rim_x - positions[:, 0]
-        lateral = positions[:, 1:] - self._rim_centre
-        recessed = (setback > 0.05) & (np.sum(lateral**2, axis=1) < self._rim_radius2)
-        hidden = np.zeros((len(points_m), len(positions)), dtype=np.bool_)
-        ahead = points_m[:, 0] - self._rim_x
-        front = ahead > 0.0
-        for index in np.flatnonzero(recessed):
-            share = setback[index] / (setback[index] + np.maximum(ahead, 1e-9))
-            crossing = lateral[index] * (1.0 - share)[:, None] + (points_m[:, 1:] - self._rim_centre) * share[:, None]
-            hidden[:, index] = front & (np.sum(crossing**2, axis=1) > self._rim_radius2)
-        return hidden

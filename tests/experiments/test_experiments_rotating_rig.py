@@ -37,7 +37,7 @@ def test_brightest_when_the_beam_points_at_the_camera(rig):
     facing_s = rig.facing_s(4.5, 25.0)
     times = facing_s + np.array([-0.06, -0.03, 0.0, 0.03, 0.06, 1.0])
     lamp = rig.imager.lit.rotating.lamp
-    halo = [shot.view.received.halo_w_m2[lamp] for shot in rig.shots(4.5, 25.0, times, np.random.default_rng(0))]
+    halo = [shot.view.arrivals["halo_w_m2"][lamp] for shot in rig.shots(4.5, 25.0, times, np.random.default_rng(0))]
     assert np.argmax(halo) == 2
     assert halo[1] == pytest.approx(halo[3], rel=1e-3)
     assert halo[5] < 1e-3 * halo[2]

@@ -15,10 +15,12 @@ from auvdock.core.camera import Camera
 from auvdock.core.landing_station import LandingStationCfg, load_landing_station
 from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 from auvdock.optics.faults import FaultCfg
+from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.lamp import LampCfg
-from auvdock.optics.landing_camera import LandingCamera, landing_imaging
+from auvdock.optics.landing_camera import landing_imaging
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.settings import ExposureCfg, ImagingCfg
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import WaterCfg, load_water
 from auvdock.sim.mj import mujoco
 
@@ -69,6 +71,28 @@ def platform_scene(station: LandingStationCfg = STATION) -> Scene:
     return Scene(model)
 
 
+def landing_setup(
+    imaging: ImagingCfg = QUIET,
+    water: WaterCfg | str = "clear",
+    lamp: LampCfg | None = None,
+    faults: FaultCfg | None = None,
+    nuisance: NuisanceCfg | None = None,
+    station: LandingStationCfg = STATION,
+) -> OpticalSetup:
+    return OpticalSetup(
+        belly_camera(),
+        load_water(water),
+        station.layout,
+        T_WORLD_STATION,
+        imaging,
+        nuisance or NuisanceCfg(),
+        lamp=lamp,
+        tag=station.tag,
+        faults=faults or FaultCfg(),
+        seen_from="above",
+    )
+
+
 def landing_camera(
     imaging: ImagingCfg = QUIET,
     water: WaterCfg | str = "clear",
@@ -77,15 +101,5 @@ def landing_camera(
     nuisance: NuisanceCfg | None = None,
     scene: Scene | None = None,
     station: LandingStationCfg = STATION,
-) -> LandingCamera:
-    return LandingCamera(
-        belly_camera(),
-        load_water(water) if isinstance(water, str) else water,
-        station,
-        nuisance or NuisanceCfg(),
-        imaging,
-        lamp,
-        faults or FaultCfg(),
-        T_WORLD_STATION,
-        scene=scene,
-    )
+) -> UnderwaterCamera:
+    return UnderwaterCamera(landing_setup(imaging, water, lamp, faults, nuisance, station), scene)

@@ -15,6 +15,7 @@ from auvdock.core.station import load_conical_station
 from auvdock.core.transforms import make_transform
 from auvdock.optics.imaging import ExposureCfg, ImagingCfg, UnderwaterCamera
 from auvdock.optics.nuisance import NuisanceCfg
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import WaterCfg, load_water
 from auvdock.sim.mj import mujoco
 
@@ -69,15 +70,9 @@ def imager(
     width_px: int = 640,
     height_px: int = 360,
 ) -> UnderwaterCamera:
-    return UnderwaterCamera(
-        camera(width_px, height_px),
-        water or load_water("clear"),
-        layout or station_layout(),
-        nuisance or NuisanceCfg(),
-        cfg,
-        T_WORLD_STATION,
-        scene=scene,
-    )
+    seen_by, seen = camera(width_px, height_px), layout or station_layout()
+    setup = OpticalSetup(seen_by, water or load_water("clear"), seen, T_WORLD_STATION, cfg, nuisance or NuisanceCfg())
+    return UnderwaterCamera(setup, scene)
 
 
 def fixed_exposure(

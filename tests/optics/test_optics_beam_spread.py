@@ -27,7 +27,7 @@ def convolved(br, theta0, half, angle):
 @pytest.mark.parametrize("theta0", [0.02, 0.05])
 def test_is_the_convolution(br, theta0):
     half = math.radians(5.0)
-    spread = beam_spread(theta0, half)
+    spread = beam_spread(halo_table(theta0), half)
     for degrees in (0.5, 2.0, 5.0, 10.0, 15.0, 30.0, 90.0):
         angle = math.radians(degrees)
         share, lead = convolved(br, theta0, half, angle)
@@ -40,7 +40,7 @@ def test_keeps_the_light(br):
     """∫ g d²θ = ∫ f d²θ: small-angle scattering moves light, it loses none. The halo's far tail is left out: 1 %."""
     half = math.radians(5.0)
     angle = np.geomspace(1e-4, math.pi, 4000)
-    share = beam_spread(0.02, half).share(np.full(len(angle), br), angle)
+    share = beam_spread(halo_table(0.02), half).share(np.full(len(angle), br), angle)
     total = np.trapezoid(share * 2.0 * math.pi * angle, angle)
     tail = 2.0 * math.pi * share[-1] * math.pi**2  # ∝ θ^-3 beyond π
     assert total + tail == pytest.approx(math.pi * half**2 / LN2, rel=0.01)
@@ -49,19 +49,19 @@ def test_keeps_the_light(br):
 def test_few_events_of_little_deflection_leave_the_beam():
     angle = np.radians([0.0, 3.0, 6.0])
     half = math.radians(5.0)
-    share = beam_spread(0.001, half).share(np.full(3, 0.001), angle)
+    share = beam_spread(halo_table(0.001), half).share(np.full(3, 0.001), angle)
     assert share == pytest.approx(np.exp(-LN2 * (angle / half) ** 2), rel=0.02)
 
 
 def test_wide_beam_is_unchanged():
     angle = np.radians([0.0, 20.0, 40.0])
     half = math.radians(40.0)
-    share = beam_spread(0.02, half).share(np.full(3, 2.0), angle)
+    share = beam_spread(halo_table(0.02), half).share(np.full(3, 2.0), angle)
     assert share == pytest.approx(np.exp(-LN2 * (angle / half) ** 2), rel=0.07)
 
 
 def test_more_scattering_wider_beam():
-    spread, far = beam_spread(0.02, math.radians(5.0)), math.radians(20.0)
+    spread, far = beam_spread(halo_table(0.02), math.radians(5.0)), math.radians(20.0)
     br = np.array([0.5, 2.0, 8.0, 20.0])
     on, off = spread.share(br, np.zeros(4)), spread.share(br, np.full(4, far))
     assert np.all(np.diff(on) < 0.0)

@@ -4,9 +4,9 @@ from optics_scene import T_WORLD_STATION, camera, imager, one_lamp, pose, statio
 
 from auvdock.optics.exposure import AutoExposure
 from auvdock.optics.imaging import ExposureCfg, ImagingCfg
-from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.sensing import BeaconSensor
 from auvdock.optics.sensor import saturated_share
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import load_water
 
 NOISY = ImagingCfg(surfaces=False)
@@ -80,7 +80,7 @@ def test_both_fidelities_choose_the_same_exposure(x, name):
     layout = station_layout()
     water = load_water(name)
     unit = imager(layout, water, NOISY)
-    sensor = BeaconSensor(camera(), water, layout, NuisanceCfg(), NOISY, T_WORLD_STATION, "threshold")
+    sensor = BeaconSensor(OpticalSetup(camera(), water, layout, T_WORLD_STATION, NOISY))
     unit.reset(np.random.default_rng(1))
     sensor.reset(np.random.default_rng(1))
     for k in range(25):

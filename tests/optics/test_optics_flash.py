@@ -1,5 +1,6 @@
 """The rotating beacon in the `beacons` fidelity against the renderer, and the exposure that meets its flashes."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -14,15 +15,17 @@ from auvdock.optics.detection_model import load_detection_model
 from auvdock.optics.exposure import AutoExposure
 from auvdock.optics.flash import FlashOptics
 from auvdock.optics.imaging import ExposureCfg, ImagingCfg, UnderwaterCamera
-from auvdock.optics.nuisance import NuisanceCfg
-from auvdock.optics.sensing import BeaconSensor, candidates_in_view
+from auvdock.optics.meeting import Candidate
+from auvdock.optics.sensing import BeaconSensor, meet
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import load_water
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
 STATION = load_conical_station("rotating")
 BEACON = STATION.rotating or RotatingBeaconCfg()
 POOL = load_water("pool")
-SCENE = (camera(), POOL, STATION.layout, NuisanceCfg(), ImagingCfg(surfaces=False), T_WORLD_STATION)
+PLAIN = OpticalSetup(camera(), POOL, STATION.layout, T_WORLD_STATION, ImagingCfg(surfaces=False))
+SCENE = dataclasses.replace(PLAIN, rotating=BEACON)
 BEHIND = 2.4
 """A bearing from which no lamp but the rotating one is seen."""
 
@@ -41,23 +44,24 @@ def facing_s(bearing_rad=BEHIND):
 
 
 def sensor():
-    unit = BeaconSensor(*SCENE, "threshold", rotating=BEACON)
+    unit = BeaconSensor(SCENE)
     unit.reset(np.random.default_rng(0))
     return unit
 
 
 def seen_and_found(range_m, degrees, detector):
     """What the model says of the flash and what the detector finds in the frame; exposure settled on the flash."""
-    unit = UnderwaterCamera(*SCENE, rotating=BEACON)
+    unit = UnderwaterCamera(SCENE)
     unit.take(place(range_m), facing_s())
     shot = unit.take(place(range_m), facing_s() + degrees / 360.0 / BEACON.rate_rev_s)
     spots = FlashOptics(unit.lit).spots(shot.view)
-    seen, _ = candidates_in_view(unit.lit, shot.view, spots, shot.exposure_s, shot.gain)
+    seen, _ = meet(unit.lit, shot.view, spots, shot.exposure_s, shot.gain)
     assert unit.lit.rotating is not None
     assert seen.flash is not None
-    assert seen.light_e_s is not None
+    assert seen.measures_flux
     place_, half, shift = seen.flash
-    said = (float(seen.contrast_dn[place_]), float(seen.light_e_s[place_]), half, shift)
+    light = Candidate.read(seen.lights, place_)
+    said = (light.contrast_dn, light.light_e_s, half, shift)
     return said, detector.detect(shot.frame), shot.view.pixels[unit.lit.rotating.lamp]
 
 
@@ -120,7 +124,7 @@ def test_station_time_decides_in_the_beacons_fidelity():
 
 
 def test_without_a_rotating_beacon_no_flux():
-    unit = BeaconSensor(*SCENE, "threshold")
+    unit = BeaconSensor(PLAIN)
     unit.reset(np.random.default_rng(0))
     found = unit.detect(place(10.0, 0.2), 0.0)
     assert len(found) > 0
@@ -129,7 +133,7 @@ def test_without_a_rotating_beacon_no_flux():
 
 def test_both_fidelities_expose_alike():
     """Sensitivities over one and a half turns agree to a factor of 1.5 in the median."""
-    unit, cam = sensor(), UnderwaterCamera(*SCENE, rotating=BEACON)
+    unit, cam = sensor(), UnderwaterCamera(SCENE)
     ratios = []
     for k in range(90):
         unit.detect(place(25.0), k / 30.0)

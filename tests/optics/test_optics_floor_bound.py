@@ -8,12 +8,15 @@ import pytest
 
 from auvdock.envs.config import rotating_world_cfg
 from auvdock.envs.world import DockingWorld
+from auvdock.optics.water import load_water
+
+WATER = load_water(rotating_world_cfg().water)
 
 
 @pytest.fixture(scope="module")
 def surfaces():
     world = DockingWorld(dataclasses.replace(rotating_world_cfg(), fidelity="pixels"))
-    found = world.imager._surfaces
+    found = world.imager.surfaces
     assert found is not None
     return found
 
@@ -22,9 +25,9 @@ def brightest_floor(unit, camera, floor_z):
     """Greatest radiance per band that reaches the camera from points of the floor, lamp by lamp, on a fine grid."""
     x, y = np.meshgrid(np.linspace(-12.0, 50.0, 249), np.linspace(-12.0, 12.0, 97))
     points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, floor_z)])
-    d = np.linalg.norm(points[:, None] - unit._lamps, axis=2)
-    light = (np.exp(-d * unit._lamp_absorption) / d**2) @ unit._spill_w_sr
-    through = np.exp(-np.linalg.norm(points - camera, axis=1)[:, None] * unit._beta_direct)
+    d = np.linalg.norm(points[:, None] - unit.light.lamps_m, axis=2)
+    light = (np.exp(-d * unit.light.absorption_per_m) / d**2) @ unit.light.spill_w_sr
+    through = np.exp(-np.linalg.norm(points - camera, axis=1)[:, None] * WATER.attenuation)
     return (light * through).max(axis=0) / math.pi
 
 
@@ -33,8 +36,8 @@ def brightest_floor(unit, camera, floor_z):
 def test_no_point_of_the_floor_outshines_the_bound(surfaces, x_m, height_m):
     floor_z = -12.0
     camera = np.array([x_m, 1.0, floor_z + height_m])
-    through = np.exp(-height_m * surfaces._beta_direct)[None]
-    bound = surfaces._plane_radiance(camera, np.array([height_m]), np.zeros(3), through)[0]
+    through = np.exp(-height_m * WATER.attenuation)[None]
+    bound = surfaces.plane_radiance(camera, np.array([height_m]), np.zeros(3), through)[0]
     true = brightest_floor(surfaces, camera, floor_z)
     lit = true > 0.0
     assert np.all(bound[lit] >= 0.999 * true[lit])

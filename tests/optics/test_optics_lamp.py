@@ -144,10 +144,8 @@ def test_surfaces_in_turbid_water_are_veiled_by_the_lamp():
         try:
             view = unit.lit.look(above(1.5), 0.0)
             images[name] = unit.electrons(view, 4e-3).astype(np.float64)
-            surfaces = unit._surfaces
-            assert surfaces is not None
-            assert surfaces.distance is not None
-            assert float(surfaces.distance.min()) > 1.0
+            assert unit.surfaces is not None
+            assert float(unit.surfaces.radiance(view.T_world_camera)[1].min()) > 1.0
             without = landing_camera(fixed(4e-3, surfaces=True), name, None, scene=scene)
             assert images[name].mean() > without.electrons(view, 4e-3).mean()
             without.close()

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from landing_scene import STATION, T_WORLD_STATION, above, belly_camera, landing_camera, platform_scene
+from landing_scene import STATION, above, landing_camera, landing_setup, platform_scene
 
 from auvdock.core.contracts import TagDetection
 from auvdock.core.errors import ConfigError
@@ -25,7 +25,6 @@ from auvdock.optics.tag_model import (
     tag_chance,
     tag_sight,
 )
-from auvdock.optics.water import load_water
 
 LIGHTS = DetectionModelCfg("test", "test", 20.0, 0.0, 6.0, 1.0, 2.0, 1.0, 0.02, 0.02, 1.0, 0.0, 0.0)
 TAGS = TagModelCfg("test", "test", 3.0, 10.0, 12.0, 4.0, 0.98, 0.9, 0.03, 2.0, 0.9)
@@ -35,18 +34,8 @@ ALL_DARK = ("B0", "B1", "B2", "B3", "B4")
 
 
 def sensor(water="clear", lamp=LAMP, faults=SOUND, nuisance=CALM, model=LIGHTS, tag_model=TAGS):
-    return LandingSensor(
-        belly_camera(),
-        load_water(water),
-        STATION,
-        nuisance,
-        landing_imaging(),
-        lamp,
-        faults,
-        T_WORLD_STATION,
-        model=model,
-        tag_model=tag_model,
-    )
+    setup = landing_setup(landing_imaging(), water, lamp, faults, nuisance)
+    return LandingSensor(setup, STATION, model=model, tag_model=tag_model)
 
 
 def sight(cell=10.0, snr=200.0, spread=0.2, whole=True):

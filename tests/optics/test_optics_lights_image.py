@@ -44,18 +44,18 @@ def test_image_holds_the_light_that_falls_within_it(size, r):
     unit = imager(one_lamp(), load_water("pool"), width_px=width, height_px=height)
     image, view = electrons(unit, pose(r))
     lens = unit.lit.lens
-    channel = unit.lit.lights.electrons_per_j[-1] * lens.aperture_m2 * 1e-3
-    received = view.received
-    whole = (received.core_w_m2[-1] + received.halo_w_m2[-1]) * channel[2]
+    channel = unit.lit.lights.lamps["electrons_per_j"][-1] * lens.aperture_m2 * 1e-3
+    arrivals = view.arrivals
+    whole = (arrivals["core_w_m2"][-1] + arrivals["halo_w_m2"][-1]) * channel[2]
     # What a halo sends past the image is integrated over the coarse grid's complement.
     corner = lens.rays.reshape(*lens.shape, 3)
-    angle = np.arccos(np.clip(corner @ received.ray_camera[-1], -1.0, 1.0))
-    density = halo_table(0.02).density(float(received.scattering_depth[-1]), np.maximum(angle, 0.05))
+    angle = np.arccos(np.clip(corner @ arrivals["ray_camera"][-1], -1.0, 1.0))
+    density = halo_table(0.02).density(float(arrivals["scattering_depth"][-1]), np.maximum(angle, 0.05))
     tail = density * lens.solid_angle_sr * lens.factor**2
     outside_core = float(tail[angle > 0.05].sum())
-    inside_core = float(halo_table(0.02).encircled(float(received.scattering_depth[-1]), np.array([0.05]))[0])
-    share = -math.expm1(-float(received.scattering_depth[-1]))
-    expected = received.core_w_m2[-1] + received.halo_w_m2[-1] * (inside_core + outside_core) / share
+    inside_core = float(halo_table(0.02).encircled(float(arrivals["scattering_depth"][-1]), np.array([0.05]))[0])
+    share = -math.expm1(-float(arrivals["scattering_depth"][-1]))
+    expected = arrivals["core_w_m2"][-1] + arrivals["halo_w_m2"][-1] * (inside_core + outside_core) / share
     assert view.inside[-1]
     assert image[:, :, 2].sum() == pytest.approx(expected * channel[2], rel=0.02)
     assert image[:, :, 2].sum() < 1.0001 * whole
@@ -77,15 +77,15 @@ def test_halo_profile_is_the_tables():
     water = load_water("pool")
     unit = imager(one_lamp(), water)
     image, view = electrons(unit, pose(15.0))
-    received, lens = view.received, unit.lit.lens
+    arrivals, lens = view.arrivals, unit.lit.lens
     x, y = 320, 180
-    channel = unit.lit.lights.electrons_per_j[-1, 2] * lens.aperture_m2 * 1e-3
+    channel = unit.lit.lights.lamps["electrons_per_j"][-1, 2] * lens.aperture_m2 * 1e-3
     for offset in (6, 15, 22, 26, 40, 90, 160, 300):
-        angle = np.arccos(lens.camera.rays(np.array([[x + offset, y]]).astype(float)) @ received.ray_camera[-1])
+        angle = np.arccos(lens.camera.rays(np.array([[x + offset, y]]).astype(float)) @ arrivals["ray_camera"][-1])
         solid = np.interp(x + offset, (np.arange(160) + 0.5) * 4 - 0.5, lens.solid_angle_sr[45])
-        density = float(halo_table(0.02).density(float(received.scattering_depth[-1]), angle)[0])
-        expected = received.halo_w_m2[-1] / -math.expm1(-float(received.scattering_depth[-1])) * density * solid
-        expected *= -math.expm1(-float(received.scattering_depth[-1]))
+        density = float(halo_table(0.02).density(float(arrivals["scattering_depth"][-1]), angle)[0])
+        expected = arrivals["halo_w_m2"][-1] / -math.expm1(-float(arrivals["scattering_depth"][-1])) * density * solid
+        expected *= -math.expm1(-float(arrivals["scattering_depth"][-1]))
         assert image[y, x + offset, 2] == pytest.approx(expected * channel, rel=0.08)
 
 
@@ -162,7 +162,7 @@ def test_lamps_add_up():
     unit = imager(both, load_water("pool"))
     for k in range(len(both.beacons)):
         view = unit.lit.look(pose(10.0), 0.0)
-        for light in (view.received.core_w_m2, view.received.halo_w_m2):
+        for light in (view.arrivals["core_w_m2"], view.arrivals["halo_w_m2"]):
             light[np.arange(len(light)) != k] = 0.0
         solo += unit.electrons(view, 1e-3)
     assert np.allclose(solo, image, rtol=1e-3, atol=1e-2)

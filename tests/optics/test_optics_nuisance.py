@@ -9,13 +9,14 @@ from auvdock.core.errors import ConfigError
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import LEVELS, PARTS, NuisanceCfg, nuisance_preset, nuisance_streams
 from auvdock.optics.scene import LitScene
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import load_water
 
 SHOW = ImagingCfg(surfaces=False)
 
 
 def scene(nuisance, seed=3, water="clear"):
-    lit = LitScene(camera(), load_water(water), station_layout(), nuisance, SHOW, T_WORLD_STATION)
+    lit = LitScene(OpticalSetup(camera(), load_water(water), station_layout(), T_WORLD_STATION, SHOW, nuisance))
     lit.reset(np.random.default_rng(seed))
     return lit
 
@@ -24,8 +25,8 @@ def factors(nuisance, frames=5, seed=3):
     """(frames, 11) what fluctuations make of the station's lamps."""
     lit, still = scene(nuisance, seed), scene(NuisanceCfg())
     count = still.lights.count
-    reference = still.look(pose(10.0), 0.0).received.core_w_m2
-    return np.array([lit.look(pose(10.0), k / 30).received.core_w_m2[:count] / reference for k in range(frames)])
+    reference = still.look(pose(10.0), 0.0).arrivals["core_w_m2"]
+    return np.array([lit.look(pose(10.0), k / 30).arrivals["core_w_m2"][:count] / reference for k in range(frames)])
 
 
 def test_streams_do_not_depend_on_levels():
@@ -51,10 +52,10 @@ def test_other_parts_leave_flicker_alone(part):
 def test_flicker_leaves_other_parts_alone(part):
     base = dataclasses.replace(NuisanceCfg(), **{part: "severe"})
     one, two = scene(base), scene(dataclasses.replace(base, flicker="severe"))
-    assert np.array_equal(one.lights.positions_m[:11], two.lights.positions_m[:11])
+    assert np.array_equal(one.lights.lamps["place_m"][:11], two.lights.lamps["place_m"][:11])
     extra = slice(11, one.lights.count)
-    assert np.array_equal(one.lights.positions_m[extra], two.lights.positions_m[extra])
-    assert np.array_equal(one.snow._places, two.snow._places)
+    assert np.array_equal(one.lights.lamps["place_m"][extra], two.lights.lamps["place_m"][extra])
+    assert np.array_equal(one.snow.places_m, two.snow.places_m)
 
 
 def test_scintillation_grows_with_the_level():
@@ -72,21 +73,21 @@ def test_interfering_lights_are_seen():
     lit = scene(NuisanceCfg(interfering_lights="severe"))
     view = lit.look(pose(15.0), 0.0)
     assert lit.lights.count == 11 + 4
-    assert np.all(view.received.core_w_m2[11:] > 0.0)
+    assert np.all(view.arrivals["core_w_m2"][11:] > 0.0)
     # None of them sits in the mouth, where it would pass for the station's.
-    assert np.all(np.hypot(*lit.lights.positions_m[11:, 1:].T) > 1.2)
+    assert np.all(np.hypot(*lit.lights.lamps["place_m"][11:, 1:].T) > 1.2)
 
 
 def test_reflections_are_mirror_images():
     lit = scene(NuisanceCfg(surface_reflection="severe"))
-    station = lit.lights.positions_m[:7]
-    images = lit.lights.positions_m[11:]
+    station = lit.lights.lamps["place_m"][:7]
+    images = lit.lights.lamps["place_m"][11:]
     assert images[:, :2] == pytest.approx(station[:, :2])
     # Both are equally far from the surface, which is 8 m above the mouth's centre.
     assert images[:, 2] - 8.0 == pytest.approx(8.0 - station[:, 2])
-    received = lit.look(pose(15.0), 0.0).received
-    assert np.all(received.ray_camera[11:, 1] < 0.0)
-    assert 0.0 < received.core_w_m2[11:].max() < received.core_w_m2[:7].max()
+    arrivals = lit.look(pose(15.0), 0.0).arrivals
+    assert np.all(arrivals["ray_camera"][11:, 1] < 0.0)
+    assert 0.0 < arrivals["core_w_m2"][11:].max() < arrivals["core_w_m2"][:7].max()
 
 
 def test_daylight_fades_with_depth_and_lifts_the_image():

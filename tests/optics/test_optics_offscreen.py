@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import threading
+from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -19,7 +20,7 @@ from auvdock.core.errors import GraphicsError
 from auvdock.envs.chase import ChaseCamera
 from auvdock.optics import gl_driver
 from auvdock.optics.gl import StaticRenderer, probe_gl
-from auvdock.optics.gl_driver import _Driver
+from auvdock.optics.gl_driver import Driver
 from auvdock.sim.mj import mujoco
 
 WALL = '<mujoco><worldbody><geom type="box" pos="0 0 3" size="2 2 1" rgba="0.2 0.6 0.9 1"/></worldbody></mujoco>'
@@ -99,17 +100,17 @@ def test_a_fork_draws_the_same_or_refuses(threads, monkeypatch):
 @pytest.mark.parametrize(
     ("driver", "egl_display", "is_lost"),
     [
-        (_Driver(), None, False),
-        (_Driver(forkable=True), 1, False),
-        (_Driver(), 1, True),  # started by somebody else, or with threads
-        (_Driver(windowed=True), None, True),
-        (_Driver(lost=True), None, True),
+        (Driver(), None, False),
+        (Driver(forkable=True), 1, False),
+        (Driver(), 1, True),  # started by somebody else, or with threads
+        (Driver(windowed=True), None, True),
+        (Driver(lost=True), None, True),
     ],
 )
 def test_which_drivers_survive_a_fork(driver, egl_display, is_lost, monkeypatch):
     monkeypatch.setattr(gl_driver, "_driver", driver)
     monkeypatch.setitem(sys.modules, "mujoco.egl", SimpleNamespace(EGL_DISPLAY=egl_display))
-    gl_driver._after_fork()
+    gl_driver.after_fork()
     assert driver.lost is is_lost
     if is_lost:
         with pytest.raises(GraphicsError, match="spawn"):
@@ -133,17 +134,17 @@ def test_a_thread_that_comes_in_between_is_told_so_and_harms_nobody():
     unit = renderer()
     try:
         image = unit.render(np.eye(4))[0]
-        offscreen = unit._drawn_by()[0]
-        with offscreen._current():
+        offscreen = unit.drawn_by()[0]
+        with offscreen.current():
             refusal = in_thread(lambda: unit.render(np.eye(4)))
         assert isinstance(refusal, GraphicsError)
         assert "another thread" in str(refusal)
         assert "\n" not in str(refusal)
         assert np.array_equal(unit.render(np.eye(4))[0], image)
         # The same where the driver itself refuses: somebody else has made our context current in his thread.
-        with offscreen._gl.as_current():
+        with offscreen.gl.as_current():
             refusal = in_thread(lambda: unit.render(np.eye(4)))
-        if type(offscreen._gl).__module__ == "mujoco.egl":
+        if type(offscreen.gl).__module__ == "mujoco.egl":
             assert isinstance(refusal, GraphicsError)
         assert np.array_equal(in_thread(lambda: unit.render(np.eye(4)))[0], image)
     finally:
@@ -166,7 +167,7 @@ class _Contextless:
         pass
 
     def as_current(self):
-        return gl_driver._without_threads()
+        return nullcontext()
 
     def free(self):
         pass
@@ -179,7 +180,7 @@ def no_context(monkeypatch):
     monkeypatch.setattr(module, "GLContext", _Contextless, raising=False)
     monkeypatch.setitem(sys.modules, "contextless", module)
     monkeypatch.setattr(gl_driver, "_makers", lambda: ["contextless"])
-    monkeypatch.setattr(gl_driver, "_driver", _Driver())
+    monkeypatch.setattr(gl_driver, "_driver", Driver())
 
 
 def test_a_context_that_is_none_is_no_context(no_context, capsys):

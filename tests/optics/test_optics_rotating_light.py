@@ -16,6 +16,7 @@ from auvdock.optics.imaging import ExposureCfg, ImagingCfg, UnderwaterCamera
 from auvdock.optics.light import beam_profile, profile_solid_angle_sr
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.phase_function import fournier_forand, wells_phase, wide_angle_phase
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import WaterCfg, load_water
 
 BEACON = RotatingBeaconCfg(position_m=(0.0, 0.0, 0.0))
@@ -26,15 +27,9 @@ NO_SCATTERING = WaterCfg("absorbing", "test", (0.05, 0.05, 0.05), (0.0, 0.0, 0.0
 def eye(water=POOL, exposure_s=1e-3, beacon=BEACON, nuisance=None):
     fixed = ExposureCfg(automatic=False, initial_s=exposure_s, max_s=max(exposure_s, 0.016))
     cfg = ImagingCfg(noise=False, surfaces=False, exposure=fixed)
-    return UnderwaterCamera(
-        camera(320, 180),
-        water,
-        BeaconLayout(far_ring()),
-        nuisance or NuisanceCfg(),
-        cfg,
-        T_WORLD_STATION,
-        rotating=beacon,
-    )
+    seen = BeaconLayout(far_ring())
+    setup = OpticalSetup(camera(320, 180), water, seen, T_WORLD_STATION, cfg, nuisance or NuisanceCfg(), beacon)
+    return UnderwaterCamera(setup)
 
 
 def place(range_m, bearing_rad=0.0, up_m=0.0):
@@ -73,23 +68,23 @@ def streak(unit, range_m, degrees):
 def test_core_is_the_profile_times_beer_lambert():
     unit = eye()
     for range_m, degrees in ((5.0, 0.0), (5.0, 4.0), (12.0, -7.0)):
-        received = unit.lit.look(place(range_m, 0.4), off(degrees, 0.4)).received
+        arrivals = unit.lit.look(place(range_m, 0.4), off(degrees, 0.4)).arrivals
         lamp = lamp_of(unit)
         peak = 30.0 * 0.35 / profile_solid_angle_sr(10.0)
         share = float(beam_profile(np.array(math.radians(degrees)), 10.0))
         expected = peak * share * math.exp(-0.40 * range_m) / range_m**2
-        assert received.core_w_m2[lamp] == pytest.approx(expected, rel=1e-9)
+        assert arrivals["core_w_m2"][lamp] == pytest.approx(expected, rel=1e-9)
 
 
 def test_scattered_light_is_seen_off_the_axis_and_only_with_scattering():
     lamp = lamp_of(eye())
     unit, total = eye(), []
     for degrees in (0.0, 10.0, 20.0, 60.0):
-        halo = unit.lit.look(place(20.0), off(degrees)).received.halo_w_m2[lamp]
+        halo = unit.lit.look(place(20.0), off(degrees)).arrivals["halo_w_m2"][lamp]
         total.append(float(halo + beam_of(unit, 20.0, degrees).light_w_m2.sum()))
     assert all(one > 2.0 * other > 0.0 for one, other in itertools.pairwise(total))
     clear = eye(NO_SCATTERING)
-    assert clear.lit.look(place(20.0), off(20.0)).received.halo_w_m2[lamp] == 0.0
+    assert clear.lit.look(place(20.0), off(20.0)).arrivals["halo_w_m2"][lamp] == 0.0
     assert beam_of(clear, 20.0, 20.0).light_w_m2.max() == 0.0
 
 
@@ -98,7 +93,7 @@ def test_beam_turns_counter_clockwise():
     lamp = lamp_of(unit)
     times = np.arange(0.0, 2.0, 0.02)
     for bearing in (1.2, -2.5, math.pi):
-        halo = [unit.lit.look(place(15.0, bearing), float(t)).received.halo_w_m2[lamp] for t in times]
+        halo = [unit.lit.look(place(15.0, bearing), float(t)).arrivals["halo_w_m2"][lamp] for t in times]
         assert math.remainder(BEACON.azimuth_rad(times[np.argmax(halo)]) - bearing, math.tau) == pytest.approx(
             0.0, abs=math.radians(2.0)
         )
@@ -139,7 +134,7 @@ def test_image_holds_the_light_of_the_pieces():
     image = streak(unit, 4.0, 150.0)
     factor2 = unit.lit.lens.factor**2
     inside = np.abs(beam.rays_camera[:, 0] / beam.rays_camera[:, 2]) < math.tan(math.radians(40.0))
-    channel = unit.lit.lights.electrons_per_j[lamp_of(unit), 2] * unit.lit.lens.aperture_m2
+    channel = unit.lit.lights.lamps["electrons_per_j"][lamp_of(unit), 2] * unit.lit.lens.aperture_m2
     expected = channel * float(beam.light_w_m2[inside].sum())
     assert image.sum() * factor2 == pytest.approx(expected, rel=0.15)
 
@@ -172,22 +167,22 @@ def test_long_exposure_averages_the_turn():
     lamp = lamp_of(unit)
     for degrees in (0.0, 6.0):
         middle = off(degrees)
-        received = unit.lit.look(place(15.0), middle, exposure_s=0.016).received
+        arrivals = unit.lit.look(place(15.0), middle, exposure_s=0.016).arrivals
         instants = middle + 0.016 * (np.arange(40) + 0.5 - 20.0) / 40.0
-        each = [unit.lit.look(place(15.0), float(t)).received.core_w_m2[lamp] for t in instants]
-        assert received.core_w_m2[lamp] == pytest.approx(np.mean(each), rel=0.01)
+        each = [unit.lit.look(place(15.0), float(t)).arrivals["core_w_m2"][lamp] for t in instants]
+        assert arrivals["core_w_m2"][lamp] == pytest.approx(np.mean(each), rel=0.01)
 
 
 def test_mirror_image_shines_when_the_beacon_does():
     nuisance = NuisanceCfg(surface_reflection="severe")
     unit = eye(nuisance=nuisance)
     lamp, image = lamp_of(unit), unit.lit.lights.count - 1
-    facing = unit.lit.look(place(25.0), off(0.0)).received
-    aside = unit.lit.look(place(25.0), off(60.0)).received
-    assert facing.halo_w_m2[lamp] > 30.0 * aside.halo_w_m2[lamp] > 0.0
+    facing = unit.lit.look(place(25.0), off(0.0)).arrivals
+    aside = unit.lit.look(place(25.0), off(60.0)).arrivals
+    assert facing["halo_w_m2"][lamp] > 30.0 * aside["halo_w_m2"][lamp] > 0.0
     # The image's light leaves the beam at atan(16 / 25) = 33° when it faces the camera, at 65° when it does not.
-    assert facing.halo_w_m2[image] > 3.0 * aside.halo_w_m2[image] > 0.0
-    assert facing.halo_w_m2[image] < 0.1 * facing.halo_w_m2[lamp]
+    assert facing["halo_w_m2"][image] > 3.0 * aside["halo_w_m2"][image] > 0.0
+    assert facing["halo_w_m2"][image] < 0.1 * facing["halo_w_m2"][lamp]
 
 
 def test_elevation_lifts_the_beam():
@@ -195,9 +190,9 @@ def test_elevation_lifts_the_beam():
     unit = eye(beacon=tilted)
     lamp = lamp_of(unit)
     up = 15.0 * math.tan(math.radians(20.0))
-    high = unit.lit.look(place(15.0, up_m=up), 0.0).received
-    level = unit.lit.look(place(15.0), 0.0).received
-    assert high.core_w_m2[lamp] > 10.0 * level.core_w_m2[lamp]
+    high = unit.lit.look(place(15.0, up_m=up), 0.0).arrivals
+    level = unit.lit.look(place(15.0), 0.0).arrivals
+    assert high["core_w_m2"][lamp] > 10.0 * level["core_w_m2"][lamp]
 
 
 def test_phase_functions_are_normalised():

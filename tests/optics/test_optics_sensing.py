@@ -18,9 +18,10 @@ from auvdock.optics.detection_model import (
     merge_close,
 )
 from auvdock.optics.imaging import ImagingCfg
-from auvdock.optics.light_loop import squared_distances
+from auvdock.optics.meeting import Candidate, squared_distances
 from auvdock.optics.nuisance import NuisanceCfg, nuisance_preset
 from auvdock.optics.sensing import BeaconSensor
+from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import WaterCfg, load_water, with_attenuation
 
 MODEL = DetectionModelCfg(
@@ -43,31 +44,20 @@ MODEL = DetectionModelCfg(
 CLEAR = load_water("clear")
 
 
-def sensor(layout=None, water=CLEAR, nuisance=None, model=None):
-    unit = BeaconSensor(
-        camera(),
-        water,
-        layout or station_layout(),
-        nuisance or NuisanceCfg(),
-        ImagingCfg(),
-        T_WORLD_STATION,
-        "threshold",
-        model,
-    )
+def sensor(layout=None, water=CLEAR, nuisance=None, model=None, imaging=None):
+    seen = layout or station_layout()
+    setup = OpticalSetup(camera(), water, seen, T_WORLD_STATION, imaging or ImagingCfg(), nuisance or NuisanceCfg())
+    unit = BeaconSensor(setup, model=model)
     unit.reset(np.random.default_rng(1))
     return unit
 
 
 def candidates(pixels, contrast, radius=0.0, around=0.0):
-    m = len(pixels)
-    places = np.array(pixels, dtype=float).reshape(m, 2)
-    ones = np.ones(m)
-    return Candidates(
-        places,
-        np.array([contrast * ones, around * ones, 0.7 * ones, radius * ones, ones, ones]),
-        squared_distances(places),
-        np.zeros(m, dtype=bool),
-    )
+    lights = Candidate.zeros(len(pixels))
+    lights["pixel"] = np.array(pixels, dtype=float).reshape(-1, 2)
+    lights["contrast_dn"], lights["surround_dn"], lights["noise_dn"] = contrast, around, 0.7
+    lights["radius_px"], lights["width_px"], lights["flux"] = radius, 1.0, 1.0
+    return Candidates(lights, squared_distances(lights))
 
 
 @pytest.mark.parametrize("name", ["threshold", "blob"])
@@ -147,14 +137,14 @@ def test_detection_curve_and_spread():
 
 
 def test_close_lights_merge_at_their_common_centre():
-    merged = merge_close(candidates([(100, 100), (102, 100), (200, 100)], 90.0), MODEL)
-    kept = merged.pixels[merged.contrast_dn > 0.0]
+    merged = merge_close(candidates([(100, 100), (102, 100), (200, 100)], 90.0), MODEL).lights
+    kept = merged["pixel"][merged["contrast_dn"] > 0.0]
     assert kept.tolist() == [[101.0, 100.0], [200.0, 100.0]]
     # Saturated discs reach further.
     apart = candidates([(100, 100), (108, 100)], 90.0, 1.0)
     wide = candidates([(100, 100), (108, 100)], 90.0, 3.0)
-    assert np.count_nonzero(merge_close(apart, MODEL).contrast_dn) == 2
-    assert np.count_nonzero(merge_close(wide, MODEL).contrast_dn) == 1
+    assert np.count_nonzero(merge_close(apart, MODEL).lights["contrast_dn"]) == 2
+    assert np.count_nonzero(merge_close(wide, MODEL).lights["contrast_dn"]) == 1
 
 
 @pytest.mark.parametrize("m", [0, 1])
@@ -195,53 +185,53 @@ def test_lamp_alone_in_distilled_water_is_seen_far_away():
     assert len(unit.detect(pose(60.0), 0.0)) == 1
 
 
-@pytest.mark.parametrize("range_m", [1.5, 4.0, 12.0, 25.0])
-def test_lights_meet_as_their_profiles_say(range_m):
-    """The compiled sums over lights and rings against the same in NumPy, 1e-12."""
-    unit = sensor()
-    view = unit.lit.look(pose(range_m), 0.0)
-    model = unit.lit.spots
-    spots = model.spots(view.received, view.inside.nonzero()[0])
-    pixels = view.pixels[view.inside]
-    assert len(pixels) > 0
-    met = model.meet(spots, pixels, 0.01, 3e4)
-    area = model.saturated_area_px2(spots, 3e4 / 0.01)
-    gap2 = np.sum((pixels[:, None] - pixels[None]) ** 2, axis=2)
-    channel = spots.channel * 0.01
-    best = channel.argmax(axis=1)
-    level = model.at_distance(spots, gap2) * channel.T[best]
-    np.testing.assert_array_equal(met.channel, best)
-    np.testing.assert_allclose(met.distance2_px2, gap2, atol=1e-9)
-    np.testing.assert_allclose(met.own_e, np.diag(level), rtol=1e-12)
-    np.testing.assert_allclose(met.around_e, level.sum(axis=1) - np.diag(level), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(met.radius_px, np.sqrt(area.max(axis=1) / np.pi), rtol=1e-12)
-    assert met.share == pytest.approx(model.share(area), rel=1e-12)
-
-
 @pytest.mark.parametrize("encoding", ["sqrt", "linear"])
-def test_one_call_sees_what_the_single_steps_see(encoding):
-    """An approach of 60 frames without nuisances, in one compiled call a frame and step by step: the same bits."""
-    at_once, by_steps = (
-        BeaconSensor(
-            camera(),
-            CLEAR,
-            station_layout(),
-            NuisanceCfg(),
-            ImagingCfg(encoding=encoding),
-            T_WORLD_STATION,
-            "threshold",
-        )
-        for _ in range(2)
+@pytest.mark.parametrize("range_m", [1.5, 4.0, 12.0, 25.0])
+def test_lights_meet_as_their_profiles_say(range_m, encoding):
+    """The compiled sums over lights and rings against the same in NumPy, 1e-9."""
+    lit = sensor(imaging=ImagingCfg(encoding=encoding)).lit
+    view, model, scale = lit.look(pose(range_m), 0.0), lit.spots, lit.scale(2.0)
+    spots, behind_e_s = model.spread(view.arrivals, view.inside.nonzero()[0]), np.array([1e4, 2e4, 3e4])
+    met = model.meet(spots, scale, 0.01, behind_e_s)
+    lights, pixels, rings = met.lights, view.pixels[view.inside], model.rings
+    assert len(pixels) > 0
+    channel = spots.rows["channel"] * 0.01
+    above = np.clip(spots.profile[:, :, None] * channel[:, None] * (2.5 / scale.saturated_e) - 2.0, 0.0, 1.0)
+    area = np.einsum("mkc,k->mc", above, rings["area_px2"])
+    gap2 = np.sum((pixels[:, None] - pixels[None]) ** 2, axis=2)
+    nearest = np.abs(0.5 * np.log(np.maximum(gap2, rings["radius_px"][0] ** 2))[..., None] - np.log(rings["radius_px"]))
+    best, light = channel.argmax(axis=1), np.arange(len(pixels))
+    level = spots.profile[light, nearest.argmin(axis=2)] * channel.T[best]
+    own = np.diag(level)
+    around = level.sum(axis=1) - own + behind_e_s[best] * 0.01
+    bright, dark = (np.minimum(scale.codes(e), 255.0) for e in (own + around, around))
+    np.testing.assert_array_equal(lights["pixel"], pixels)
+    np.testing.assert_array_equal(lights["red"], best == 0)
+    np.testing.assert_allclose(met.distance2_px2, gap2, atol=1e-9)
+    np.testing.assert_allclose(lights["flux"], own, rtol=1e-12)
+    np.testing.assert_allclose(lights["surround_dn"], dark, rtol=1e-9)
+    np.testing.assert_allclose(lights["contrast_dn"], bright - dark, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(lights["noise_dn"], scale.noise_dn(own + around), rtol=1e-12)
+    np.testing.assert_allclose(lights["radius_px"], np.sqrt(area.max(axis=1) / np.pi), rtol=1e-12)
+    assert met.saturated_px2 == pytest.approx(float(area.sum()), rel=1e-12)
+    np.testing.assert_allclose(model.saturated_area_px2(spots, scale.saturated_e / 0.01), area, rtol=1e-12)
+
+
+def same(arrivals, others):
+    """Whether two frames show the same light from the same directions."""
+    return all(
+        np.array_equal(arrivals[name], others[name]) for name in ("ray_camera", "pixel", "core_w_m2", "halo_w_m2")
     )
-    assert at_once.lit.is_plain
-    by_steps.lit.is_plain = False
-    for unit in (at_once, by_steps):
-        unit.reset(np.random.default_rng(5))
-    for frame in range(60):
-        body = pose(25.0 - 0.4 * frame, 0.3, -0.1, 0.05)
-        one, other = (unit.detect(body, frame / 30.0) for unit in (at_once, by_steps))
-        for name in ("xyxy", "centre_px", "score", "class_id"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        assert at_once.exposure.sensitivity_s == by_steps.exposure.sensitivity_s
-    disturbed = NuisanceCfg(flicker="mild"), NuisanceCfg(daylight="mild"), NuisanceCfg(surface_reflection="mild")
-    assert not any(sensor(nuisance=nuisance).lit.is_plain for nuisance in disturbed)
+
+
+def test_nuisances_are_steps_and_where_there_are_none_light_goes_straight():
+    """Light that arrives is that of the lamps alone, whatever was looked at before."""
+    lit = sensor().lit
+    seen = [lit.look(pose(x), 0.1 * x).arrivals for x in (5.0, 9.0, 5.0)]
+    assert same(seen[0], seen[2])
+    T_station_camera = invert(T_WORLD_STATION) @ pose(9.0) @ camera().T_body_camera
+    assert same(seen[1], lit.lights.arrive(T_station_camera, lit.lens.projection))
+    for part in ("flicker", "surface_reflection"):
+        disturbed = sensor(nuisance=dataclasses.replace(NuisanceCfg(), **{part: "severe"})).lit
+        one, other = (disturbed.look(pose(9.0), t).arrivals for t in (0.0, 1.0))
+        assert not same(one, other)

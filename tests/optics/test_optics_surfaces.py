@@ -16,13 +16,13 @@ DAY = NuisanceCfg(daylight="severe")
 
 
 def surfaces(unit):
-    assert unit._surfaces is not None
-    return unit._surfaces
+    assert unit.surfaces is not None
+    return unit.surfaces
 
 
 def middle(unit, x):
     """Radiance per band in the middle of the view of a wall from a distance x."""
-    image = surfaces(unit).radiance(pose(x) @ unit.lit.camera.T_body_camera)
+    image, _ = surfaces(unit).radiance(pose(x) @ unit.lit.camera.T_body_camera)
     rows, columns = image.shape[:2]
     return image[rows // 2, columns // 2].astype(np.float64)
 
@@ -51,7 +51,7 @@ def test_depth_is_metric_over_the_whole_view():
     unit = imager(one_lamp(), load_water("I"), SHOW, DAY, wall_scene(30.0))
     try:
         for z in (0.5, 3.0, 12.0, 40.0):
-            _, depth = surfaces(unit)._renderer.render(pose(z) @ unit.lit.camera.T_body_camera)
+            _, depth = surfaces(unit).renderer.render(pose(z) @ unit.lit.camera.T_body_camera)
             assert float(np.abs(depth - z).max()) < 0.002 * z
     finally:
         unit.close()
@@ -69,7 +69,7 @@ def test_lens_distortion_bends_surfaces_as_it_bends_lights():
         body = pose(4.0)
         view = unit.lit.look(body, 0.0)
         with_box = unit.electrons(view, 1e-2).copy()[:, :, 1]
-        unit._surfaces = None
+        unit.surfaces = None
         box = np.maximum(with_box - unit.electrons(view, 1e-2)[:, :, 1], 0.0)
         box[box < 0.3 * box.max()] = 0.0
         seen = np.array([box.sum(axis=0) @ np.arange(640), box.sum(axis=1) @ np.arange(360)]) / box.sum()
@@ -86,7 +86,7 @@ def test_the_vehicle_does_not_see_itself():
     scene = wall_scene(5.0)
     unit = imager(one_lamp(), load_water("clear"), SHOW, DAY, scene)
     try:
-        colour, _ = surfaces(unit)._renderer.render(pose(5.0) @ unit.lit.camera.T_body_camera)
+        colour, _ = surfaces(unit).renderer.render(pose(5.0) @ unit.lit.camera.T_body_camera)
         # The body at the camera's place is a red sphere around it; the wall is white.
         assert int(np.ptp(colour.astype(int), axis=2).max()) <= 2
     finally:
@@ -127,7 +127,7 @@ def test_nothing_is_rendered_before_a_surface_can_be_seen(monkeypatch):
 
 def test_distance_to_surfaces():
     unit = imager(one_lamp(), load_water("clear"), SHOW, DAY, wall_scene(5.0))
-    distance = surfaces(unit)._geoms.distance_m
+    distance = surfaces(unit).geoms.distance_m
     assert distance(np.array([7.0, 0.0, -DEPTH_M])) == pytest.approx([7.0])
     assert distance(np.array([3.0, 74.0, -DEPTH_M])) == pytest.approx([5.0])
     assert distance(np.array([-0.05, 1.0, -DEPTH_M])) == pytest.approx([0.0])

@@ -17,7 +17,7 @@ from auvdock.optics.landing_camera import landing_imaging
 from auvdock.optics.nuisance import NuisanceCfg
 from auvdock.optics.settings import ExposureCfg
 from auvdock.optics.tag_pattern import corners_station_m, reflectances, tag_cells, tag_png, tag_to_station
-from auvdock.optics.tag_pixels import add_tag
+from auvdock.optics.tag_pixels import TagLight, add_tag
 from auvdock.optics.water import WaterCfg
 from auvdock.sim.mj import mujoco
 
@@ -84,10 +84,10 @@ def test_picture_is_a_texture_that_mujoco_takes():
 )
 def test_opencv_reads_the_tag_with_its_corners_where_they_are(height_m, yaw_deg, tilt_deg):
     day = NuisanceCfg(daylight="severe")
-    unit = landing_camera(dataclasses.replace(LINEAR, lamp_spill=0.0), "clear", None, ALL_DARK, day)
+    short = dataclasses.replace(LINEAR, lamp_spill=0.0, exposure=fixed(3e-4).exposure)
+    unit = landing_camera(short, "clear", None, ALL_DARK, day)
     body = above(height_m, 0.05, -0.04, yaw_deg, tilt_deg, -tilt_deg)
     unit.reset(np.random.default_rng(0))
-    unit.exposure._sensitivity_s = 3e-4
     found = read(unit.capture(body, 0.0).image)
     assert set(found) == {0}
     # OpenCV refines on a window about the corner; black cells beside it pull by some tenths of a pixel.
@@ -201,7 +201,8 @@ def pattern(place, sigma, veil):
     below[:, :, 1] = -1.0
     cells = reflectances(STATION.tag)
     one = np.eye(3, dtype=np.float32)
-    add_tag(image, (0, 0, size, size), tangents, one, cells, (sigma, sigma), unit, beside, below, 4 / size, (0.0, 0))
+    light = TagLight(unit, beside, below, 4 / size, 0.0, 0)
+    add_tag(image, (0, 0, size, size), tangents, one, cells, (sigma, sigma), light)
     assert not image[:, :, 2].any()
     return image[:, :, 0].astype(float), image[:, :, 1].astype(float)
 
@@ -269,8 +270,8 @@ def test_the_models_own_tag_is_left_out():
     unit = landing_camera(dataclasses.replace(QUIET, surfaces=True), "clear", LampCfg(), scene=platform_scene())
     try:
         unit.reset(np.random.default_rng(0))
-        assert unit._surfaces is not None
-        colour, _ = unit._surfaces._renderer.render(above(1.0) @ unit.lit.camera.T_body_camera)
+        assert unit.surfaces is not None
+        colour, _ = unit.surfaces.renderer.render(above(1.0) @ unit.lit.camera.T_body_camera)
         # The model's tag is a red box; platform and guides are grey.
         assert int(np.ptp(colour.astype(int), axis=2).max()) < 60
         image = unit.capture(above(1.0), 0.0).image

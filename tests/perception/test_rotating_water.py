@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from auvdock.optics.beam_spread import beam_spread
+from auvdock.optics.halo import halo_table
 from auvdock.perception.rotating.profile import beam_sigma_rad, pass_profile
 
 
@@ -15,7 +16,7 @@ from auvdock.perception.rotating.profile import beam_sigma_rad, pass_profile
 def test_one_parameter_meets_wells_spread_of_the_beam(br: float, theta0: float) -> None:
     """Within 2 % of the peak out to 40°, for clear to murky water; more scattering, more widening."""
     angle = np.radians(np.linspace(0.01, 40.0, 81))
-    light = beam_spread(theta0, math.radians(5.0)).share(np.full(len(angle), br), angle)
+    light = beam_spread(halo_table(theta0), math.radians(5.0)).share(np.full(len(angle), br), angle)
     light /= light[0]
     beam = beam_sigma_rad(10.0)
 

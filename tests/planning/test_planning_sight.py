@@ -35,20 +35,18 @@ def test_irradiance_and_pixels_equal_those_of_one_pose_at_a_time(water):
     layout = load_conical_station().layout
     lights = LightSet(layout, load_water(water))
     camera = forward_camera(CameraCfg())
-    sight = Sight(camera, load_water(water), layout, ImagingCfg(), lights)
+    sight = Sight(camera, load_water(water), layout, ImagingCfg())
     points = places(40, np.random.default_rng(3))
-    many = sight.arriving(points)
-    pixels, inside = sight.on_sensor(points, many.offset_m)
+    many = np.array(sight.look(points)).reshape(len(points), lights.count)
     lens = Lens(camera, ImagingCfg())
     for index, point in enumerate(points):
         rotation = rotation_looking_along(sight.target_m - point, UP)
-        one = lights.received(make_transform(rotation, point))
-        np.testing.assert_allclose(many.core_w_m2[index], one.core_w_m2, rtol=1e-9, atol=1e-300)
-        np.testing.assert_allclose(many.halo_w_m2[index], one.halo_w_m2, rtol=1e-9, atol=1e-300)
-        np.testing.assert_allclose(many.range_m[index], one.range_m, rtol=1e-12)
-        pixel, shown = lens.locate(one.ray_camera)
-        np.testing.assert_array_equal(inside[index], shown)
-        np.testing.assert_allclose(pixels[index][shown], pixel[shown], atol=1e-9)
+        one = lights.arrive(make_transform(rotation, point), lens.projection)
+        for name in ("core_w_m2", "halo_w_m2", "range_m", "ray_camera"):
+            np.testing.assert_allclose(many[index][name], one[name], rtol=1e-9, atol=1e-12)
+        shown = one["inside"]
+        np.testing.assert_array_equal(many[index]["inside"], shown)
+        np.testing.assert_allclose(many[index]["pixel"][shown], one["pixel"][shown], atol=1e-9)
 
 
 def lone_isotropic_lamp(imaging, absorption):
@@ -58,10 +56,9 @@ def lone_isotropic_lamp(imaging, absorption):
     dark = [dataclasses.replace(lamp, power_w=1e-12) for lamp in ring[1:]]
     lamp = dataclasses.replace(ring[0], position_m=(0.0, 0.0, 0.0))
     layout = BeaconLayout((lamp, *dark))
-    lights = LightSet(layout, water)
-    sight = Sight(forward_camera(CameraCfg()), water, layout, imaging, lights)
-    sight._beam = lambda index, angle: np.ones_like(angle)
-    lights.peak_w_sr[:] = lights.flux_w / (4.0 * math.pi)
+    sight = Sight(forward_camera(CameraCfg()), water, layout, imaging)
+    sight.lights.lamps["minus_profile"] = 0.0
+    sight.lights.lamps["peak_w_sr"] = sight.lights.lamps["flux_w"] / (4.0 * math.pi)
     sight.target_m = np.zeros(3)
     return sight
 
@@ -80,7 +77,7 @@ def test_one_isotropic_lamp_in_water_that_does_not_scatter_gives_the_sphere(abso
     sigma2 = imaging.lens_sigma_px**2 + SMOOTHING_PX2
     centre = math.exp(-0.5 * float(sight.spots.radii_px[0]) ** 2 / sigma2) / (2.0 * math.pi * sigma2)
     per_irradiance = float(sight.channel[0, 2]) * exposure.initial_s * centre
-    intensity = float(sight.lights.flux_w[0]) / (4.0 * math.pi)
+    intensity = float(sight.lights.lamps["flux_w"][0]) / (4.0 * math.pi)
 
     def excess(r):
         return intensity * math.exp(-absorption * r) / r**2 * per_irradiance - electrons
