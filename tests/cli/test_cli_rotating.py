@@ -34,7 +34,7 @@ def test_own_flags_change_what_they_say():
     [
         (["--drop-frames", "2"], "frame_drop_share"),
         (["--clock-offset", "nan"], "clock-offset"),
-        (["--world.station-heading", "guessed"], "station_heading"),
+        (["--world.station-heading", "guessed"], "station-heading"),
         (["--level", "7"], "level"),
     ],
 )

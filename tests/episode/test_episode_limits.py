@@ -49,7 +49,7 @@ def within(value: Any) -> Iterator[Checked]:
         yield from (part for inner in value for part in within(inner))
 
 
-CLASSES = sorted(set(offspring(Checked)), key=lambda cls: (cls.__module__, cls.__qualname__))
+CLASSES = sorted(filter(dataclasses.is_dataclass, set(offspring(Checked))), key=lambda cls: (cls.__module__, cls.__qualname__))
 SAMPLES: dict[type, Checked] = {}
 for whole in (
     *(kind.level(1) for kind in STATIONS.values()),
@@ -84,7 +84,7 @@ PROMISES: Mapping[str, Any] = {
     rf"more than {_NUMBER}": lambda value, bound: value > bound,
     rf"less than {_NUMBER}": lambda value, bound: value < bound,
     rf"at most {_NUMBER}": lambda value, bound: value <= bound,
-    rf"{_NUMBER}[^\d]* or more": lambda value, bound: value >= bound,
+    rf"{_NUMBER}(?: 1/\w+|[^\d]*) or more": lambda value, bound: value >= bound,
     rf"{_NUMBER} to {_NUMBER}": lambda value, low, high: low <= value <= high,
 }
 """What a message's words mean, read apart from the code that makes them."""

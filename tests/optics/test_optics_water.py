@@ -87,7 +87,7 @@ def test_no_water_is_darker_than_mud(c_450):
     assert caught.value.field == "attenuation_per_m"
     with pytest.raises(ConfigError) as caught:
         WaterCfg("ink", "test", (0.02, c_450, 0.28), (0.0, 0.0, 0.0))
-    assert caught.value.field == "absorption_per_m"
+    assert caught.value.field == "absorption_per_m[1]"
 
 
 def test_unknown_water_names_those_that_exist():
