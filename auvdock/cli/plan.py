@@ -88,7 +88,7 @@ def run(argv: Sequence[str], prog: str) -> int:
         cfg = PlanCfg(args.water, args.attenuation, camera, min_lights=args.min_lights, resolution=args.resolution)
         sees = make_detectability(layout, cfg)
         search = _search(args, station)
-    cases = variants(station) if args.sweep else []
+    cases, where = variants(station) if args.sweep else [], f"{shown(args.station.stem)} in {args.water}"
     if args.out is not None:
         make_folder(args.out)
     layouts = search.population * (search.generations + 1) if search is not None else 0
@@ -113,15 +113,13 @@ def run(argv: Sequence[str], prog: str) -> int:
                 flown = args.out / "optimised.toml"
                 saving.attempt(flown, lambda path: write_station(path, designed))
         if args.out is not None:
-            name = shown(args.station.stem)
-            title = f"{name} in {args.water}: {space.volume_m3:.0f} m³"
+            title = f"{where}: {space.volume_m3:.0f} m³"
             panels = section_panels(sees, layout, space, lambda: progress.advance(task), min(64, args.resolution + 8))
             saving.attempt(args.out / "sections.png", lambda path: draw_sections(path, title, panels, cfg.min_lights))
             saving.attempt(args.out / "region.rrd", lambda path: record_region(path, layout, spaces))
         points = sweep(cases, cfg, lambda: progress.advance(task)) if cases else []
         if args.out is not None and points:
-            title = f"{shown(args.station.stem)} in {args.water}"
-            saving.attempt(args.out / "sweeps.png", lambda path: draw_curves(path, title, _curves(points)))
+            saving.attempt(args.out / "sweeps.png", lambda path: draw_curves(path, where, _curves(points)))
     report = _report(args, space, region_s, points, saving.written)
     report["optimised"] = optimised
     report["fly_it"] = _flying(args, station, flown)

@@ -49,7 +49,9 @@ def within(value: Any) -> Iterator[Checked]:
         yield from (part for inner in value for part in within(inner))
 
 
-CLASSES = sorted(filter(dataclasses.is_dataclass, set(offspring(Checked))), key=lambda cls: (cls.__module__, cls.__qualname__))
+CLASSES = sorted(
+    filter(dataclasses.is_dataclass, set(offspring(Checked))), key=lambda cls: (cls.__module__, cls.__qualname__)
+)
 SAMPLES: dict[type, Checked] = {}
 for whole in (
     *(kind.level(1) for kind in STATIONS.values()),

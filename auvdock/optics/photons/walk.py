@@ -93,7 +93,7 @@ def turn_of(share: float, quantiles: Array, power: float) -> float:
 
 
 @compiled
-def _walk(
+def _walk(  # noqa: PLR0913 - tables in, three tallies out: nothing that belongs together
     photons: int,
     quantiles: Array,
     power: float,
