@@ -161,13 +161,7 @@ class Credibility:
             noise: what was known before, and what the lights were solved with: σ of √noise σ_px.
             solution: a pose, believed or not.
         """
-        freedom = 2.0 * solution.lights_n - 6.0
-        if self._attitude_sigma_rad > 0.0:
-            freedom += min(_share_by_prior(solution.record, self._attitude_rad2), 3.0)
-        if freedom <= 0.0:
-            return noise
-        shown = min(_NOISE_MARGIN * solution.lights_cost / freedom, _MOST_SURPRISE)
-        return min(max(noise * (1.0 + (shown - 1.0) / _NOISE_FRAMES), _LEAST_NOISE), _GREATEST_NOISE)
+        return _noise_after(noise, solution.record, 2.0 * solution.lights_n - 6.0, self._attitude_rad2)
 
     def log_odds(
         self,
@@ -274,10 +268,13 @@ def _noise_along(solution: Solution, along: Array, attitude_rad2: float) -> floa
 
 
 @compiled
-def _share_by_prior(solution: Records[Solution], attitude_rad2: float) -> float:
-    """Tr (P Σ)² of the rotation: how many of its three numbers the attitude prior decides."""
-    share = np.empty(9)
-    for i in range(3):
-        for j in range(3):
-            share[3 * i + j] = solution[0].covariance[3 + i, 3 + j] / attitude_rad2
-    return np.dot(share, share)
+def _noise_after(noise: float, solution: Records[Solution], freedom: float, attitude_rad2: float) -> float:
+    """`Credibility.noise_after` where lights alone have so many degrees of freedom."""
+    if attitude_rad2 > 0.0:
+        # How many of the rotation's three numbers the prior decides: tr (P Σ)².
+        by_prior = (solution[0].covariance[3:, 3:] / attitude_rad2).ravel()
+        freedom += min(np.dot(by_prior, by_prior), 3.0)
+    if freedom <= 0.0:
+        return noise
+    shown = min(_NOISE_MARGIN * solution[0].lights_cost / freedom, _MOST_SURPRISE)
+    return min(max(noise * (1.0 + (shown - 1.0) / _NOISE_FRAMES), _LEAST_NOISE), _GREATEST_NOISE)

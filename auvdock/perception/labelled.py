@@ -45,7 +45,7 @@ def gather_lights(
     part that is left: off by up to half of the box.
 
     Args:
-        tracks: (n,) tracks.
+        tracks: (n,) tracks, each beacon carried by one at most.
         centre_px: (m, 2) this frame's detections.
         xyxy: (m, 4) their boxes, px.
         size_px: width and height of the picture.
