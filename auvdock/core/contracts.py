@@ -92,7 +92,7 @@ class Detections:
 
     def __post_init__(self) -> None:
         """Check shapes."""
-        check_shape("score", self.score, (None,))
+        check_shape("score", self.score, (getattr(self.score, "shape", None) or (None,))[:1])
         n = len(self.score)
         if self.flux is not None:
             check_shape("flux", self.flux, (n,))

@@ -45,22 +45,16 @@ class Answer(NamedTuple):
     """What a detector finds, brightest first.
 
     Attributes:
-        which: (k,) index of the light.
         centre: (k, 2) pixels.
         xyxy: (k, 4) boxes.
         score: (k,) between 0 and 1.
         class_id: (k,) `BLUE` or `RED`.
-        lights: (m,) the lights as they are merged; those that went into another have contrast 0.
-        veiled: how many of them are veiled by their surroundings.
     """
 
-    which: IntArray
     centre: Array
     xyxy: Array
     score: Array
     class_id: IntArray
-    lights: Records[Candidate]
-    veiled: int
 
 
 class Ghosts(NamedTuple):
@@ -82,7 +76,7 @@ class Ghosts(NamedTuple):
 @compiled
 def answer(
     lights: Records[Candidate], distance2: Array, law: Records[DetectionLaw], chance: Array, noise: Array, flash: int
-) -> Answer:
+) -> tuple[Array, Array, Array, IntArray, IntArray, int]:
     """Which lights (m,) the detector finds, and where.
 
     Args:
@@ -92,6 +86,9 @@ def answer(
         chance: (2, m) even draws, for finding a light and for its colour.
         noise: (m, 2) normal draws, for its centre.
         flash: the rotating beacon's place among the lights, -1 for none.
+
+    Returns:
+        Those found as the four parts of `Answer`, where each is among the lights (k,), and how many lights are veiled.
     """
     merged = lights.copy()
     merge(merged, distance2, law)
@@ -110,7 +107,7 @@ def answer(
         snr = law[0].score_gain * light.contrast_dn / light.noise_dn
         score[k] = snr / (snr + HALF_SCORE_SNR)
         class_id[k] = RED if light.red != (chance[1, found[k]] < law[0].wrong_colour) else BLUE
-    return Answer(found, centre, xyxy, score, class_id, merged, count_veiled(lights))
+    return centre, xyxy, score, class_id, found, count_veiled(lights)
 
 
 @compiled
@@ -191,10 +188,8 @@ def _find(lights: Records[Candidate], law: DetectionLaw, chance: Array, flash: i
 
 
 @compiled
-def add_ghosts(
-    found: Answer, ghosts: Ghosts, lights: Records[Candidate], width_px: int, height_px: int
-) -> tuple[Array, Array, Array, IntArray]:
-    """Centres, boxes, scores and classes of what is found (k,) and behind it of ghosts (g,), kept on the sensor."""
+def add_ghosts(found: Answer, ghosts: Ghosts, lights: Records[Candidate], width_px: int, height_px: int) -> Answer:
+    """What is found (k,) and behind it ghosts (g,), kept on the sensor."""
     real = len(found.score)
     count = real + len(ghosts.at)
     centre, xyxy = np.empty((count, 2)), np.empty((count, 4))
@@ -207,4 +202,4 @@ def add_ghosts(
             place = min(max(lights[ghosts.at[g]].pixel[axis] + ghosts.shift[g, axis], -0.5), last)
             k = real + g
             centre[k, axis], xyxy[k, axis], xyxy[k, 2 + axis] = place, place - _GHOST_PX, place + _GHOST_PX
-    return centre, xyxy, score, class_id
+    return Answer(centre, xyxy, score, class_id)

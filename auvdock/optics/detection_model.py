@@ -18,7 +18,7 @@ from auvdock.core.contracts import Detections
 from auvdock.core.limits import NotNegative, Positive, Share
 from auvdock.core.strict import load_toml
 from auvdock.numeric.records import Records
-from auvdock.optics.answer import DetectionLaw, Ghosts, add_ghosts, answer, count_veiled, merge
+from auvdock.optics.answer import Answer, DetectionLaw, Ghosts, add_ghosts, answer, count_veiled, merge
 from auvdock.optics.meeting import Candidate
 
 __all__ = [
@@ -179,13 +179,14 @@ def draw_detections(
     """
     m, flash = len(seen.lights), seen.flash
     chance, noise = rng.random((2, m)), rng.standard_normal((m, 2))
-    found = answer(seen.lights, seen.distance2_px2, model.law, chance, noise, -1 if flash is None else flash.place)
-    rate = model.false_alarms * found.veiled / max(m, 1)
+    centre, xyxy, score, class_id, which, veiled = answer(
+        seen.lights, seen.distance2_px2, model.law, chance, noise, -1 if flash is None else flash.place
+    )
+    rate = model.false_alarms * veiled / max(m, 1)
     alarms = rng.poisson(rate) if rate > 0.0 else 0
-    which, centre, xyxy, score, class_id, lights, _ = found
     ways = model.flash or _FLASH
     if flash is not None and flash.place in which:
-        place, light = int(np.flatnonzero(which == flash.place)[0]), Candidate.read(lights, flash.place)
+        place, light = int(np.flatnonzero(which == flash.place)[0]), Candidate.read(seen.lights, flash.place)
         half = np.maximum(0.5 * (xyxy[place, 2:] - xyxy[place, :2]), ways.box_scale * flash.half_px)
         spread_px = ways.centre_spread * (10.0 * (light.noise_dn / light.contrast_dn)) * float(half.mean())
         centre[place] += ways.centre_shift * flash.shift_px + spread_px * rng.standard_normal(2)
@@ -193,12 +194,13 @@ def draw_detections(
     flux = None
     if seen.measures_flux:
         draws = rng.standard_normal((2, len(which)))
-        light_e_s = lights["light_e_s"][which] * np.exp(ways.flux_spread * draws[0])
-        flux = np.maximum(light_e_s + lights["light_noise_e_s"][which] * draws[1], 0.0)
+        light_e_s = seen.lights["light_e_s"][which] * np.exp(ways.flux_spread * draws[0])
+        flux = np.maximum(light_e_s + seen.lights["light_noise_e_s"][which] * draws[1], 0.0)
     if alarms:
         # About the lights whose haze they are.
         at, shift = rng.integers(0, m, alarms), rng.normal(0.0, _HAZE_PX, (alarms, 2))
         ghosts = Ghosts(at, shift, rng.uniform(0.2, 0.5, alarms), rng.integers(0, 2, alarms))
+        found = Answer(centre, xyxy, score, class_id)
         centre, xyxy, score, class_id = add_ghosts(found, ghosts, seen.lights, *size_px)
         if flux is not None:
             flux = np.concatenate([flux, np.full(alarms, _GHOST_FLUX * (float(flux.min()) if len(flux) else 1.0))])

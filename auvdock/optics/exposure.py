@@ -34,6 +34,11 @@ class AutoExposure:
     the brightest of the frames in it, each share taken in proportion to sensitivity: it falls at once, by up to 4 a
     frame (ours: a pass takes some ten frames), and rises only as far as the last flash allows, by no more than 2 within
     the memory (a flash that saturates nothing does not tell how much brighter it may be).
+
+    Attributes:
+        exposure_s: exposure time of the next frame.
+        gain: its analogue gain.
+        sensitivity_s: exposure time × gain.
     """
 
     def __init__(self, cfg: ExposureCfg, memory_frames: int = 0) -> None:
@@ -51,27 +56,12 @@ class AutoExposure:
         if memory_frames > 0:
             self._memory = deque(maxlen=memory_frames)
             self.metered = _METERED_WITH_MEMORY
-        self._sensitivity_s = cfg.initial_s
+        self._choose(cfg.initial_s)
         self.settled = False
-
-    @property
-    def exposure_s(self) -> float:
-        """Exposure time of the next frame."""
-        return min(max(self._sensitivity_s, self._cfg.min_s), self._cfg.max_s)
-
-    @property
-    def gain(self) -> float:
-        """Analogue gain of the next frame."""
-        return min(max(self._sensitivity_s / self._cfg.max_s, 1.0), self._cfg.max_gain)
-
-    @property
-    def sensitivity_s(self) -> float:
-        """Exposure time × gain."""
-        return self._sensitivity_s
 
     def reset(self) -> None:
         """Forget the frames before; the next frame is the first."""
-        self._sensitivity_s = self._cfg.initial_s
+        self._choose(self._cfg.initial_s)
         self.settled = False
         if self._memory is not None:
             self._memory.clear()
@@ -92,7 +82,7 @@ class AutoExposure:
                 low = middle
             else:
                 high = middle
-        self._sensitivity_s = (low * high) ** 0.5
+        self._choose((low * high) ** 0.5)
 
     def update(self, saturated_share: float) -> None:
         """Take note of a frame; changes the exposure of the next."""
@@ -100,9 +90,9 @@ class AutoExposure:
             return
         fall = self._cfg.max_step
         if self._memory is not None:
-            self._memory.append((saturated_share, self._sensitivity_s))
+            self._memory.append((saturated_share, self.sensitivity_s))
             if saturated_share <= self._cfg.saturated_share:
-                now_s = self._sensitivity_s
+                now_s = self.sensitivity_s
                 saturated_share = max(share * now_s / then_s for share, then_s in self._memory)
                 # What was too bright then has been dealt with then.
                 saturated_share = min(saturated_share, self._cfg.saturated_share)
@@ -114,7 +104,13 @@ class AutoExposure:
         high = self._cfg.max_s * self._cfg.max_gain
         if self._memory is not None:
             high = min(high, _GREATEST_RISE * min(then_s for _, then_s in self._memory))
-        self._sensitivity_s = min(max(self._sensitivity_s * step, self._cfg.min_s), high)
+        self._choose(min(max(self.sensitivity_s * step, self._cfg.min_s), high))
+
+    def _choose(self, sensitivity_s: float) -> None:
+        """Share sensitivity out between time and gain."""
+        cfg, self.sensitivity_s = self._cfg, sensitivity_s
+        self.exposure_s = min(max(sensitivity_s, cfg.min_s), cfg.max_s)
+        self.gain = min(max(sensitivity_s / cfg.max_s, 1.0), cfg.max_gain)
 
 
 def frames_of_a_turn(camera: Camera, rotating: RotatingBeaconCfg | None) -> int:

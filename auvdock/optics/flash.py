@@ -39,12 +39,11 @@ class FlashOptics:
 
     def spots(self, view: View) -> Spots:
         """Profiles of the lights in view, the beam counted to its lamp."""
-        index = view.inside.nonzero()[0]
-        spots = self._lit.spots.spread(view.arrivals, index)
+        spots = self._lit.spots.spread(view.arrivals, view.inside)
         rotating, beam = self._lit.rotating, view.beam
         if rotating is None or beam is None:
             return spots
-        place = np.flatnonzero(index == rotating.lamp)
+        place = np.flatnonzero(spots.rows["lamp"] == rotating.lamp)
         if len(place) == 0:
             return spots
         flash = self._lines(spots, int(place[0]), beam)
@@ -84,7 +83,7 @@ def measured_light(lit: LitScene, spots: Spots, seen: Candidates, exposure_s: fl
     radii. Of a saturated spot it extrapolates the halo and misses most of the core: 0.12 + 0.9 of the light beside the
     core remains, from a saturated radius of 2.5 px on (fitted on rendered frames to a fifth).
     """
-    radii, rings = lit.spots.radii_px, lit.spots.rings["area_px2"]
+    radii, rings = lit.spots.radii_px, lit.spots.ring_px2
     disc_px = max(_DISC_RAD / lit.lens.rad_per_px, _MIN_DISC_PX)
     area = math.pi * disc_px**2
     inner = rings * (radii < disc_px)

@@ -75,7 +75,7 @@ class LandingSensor:
     def detect(self, T_world_body: Array, time_s: float) -> tuple[Detections, tuple[TagDetection, ...]]:
         """Detections of lights and of the tag in a frame from a body pose (4, 4)."""
         view = self.lit.look(T_world_body, time_s)
-        spots = self.lit.spots.spread(view.arrivals, view.inside.nonzero()[0])
+        spots = self.lit.spots.spread(view.arrivals, view.inside)
         hidden = self._cover.hidden(self.tag.height_m(view.T_world_camera), time_s)
         ground = self.ground.electrons_per_s(view.T_world_camera, tag_hidden=hidden)
         exposure = self.exposure

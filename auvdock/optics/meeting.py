@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.records import Record, Records
-from auvdock.optics.spread import Ring, Spot, SpreadLaw
+from auvdock.optics.spread import Spot, SpreadLaw
 
 __all__ = [
     "Candidate",
     "CodeScale",
-    "Meeting",
     "codes",
     "level_at",
     "meet",
@@ -67,20 +66,6 @@ class Candidate(Record):
     """Its standard deviation by shot and read noise."""
 
 
-class Meeting(NamedTuple):
-    """Lights on the sensor as they are seen beside each other.
-
-    Attributes:
-        lights: (m,) as a detector meets them.
-        distance2_px2: (m, m) squared distances between them.
-        saturated_px2: samples that are saturated, as an area over all channels; overlap is not counted.
-    """
-
-    lights: Records[Candidate]
-    distance2_px2: Array
-    saturated_px2: float
-
-
 _CANDIDATE = Candidate.dtype()
 
 
@@ -89,21 +74,23 @@ def meet(
     rows: Records[Spot],
     profile: Array,
     law: Records[SpreadLaw],
-    rings: Records[Ring],
     scale: Records[CodeScale],
     behind_e_s: Array,
     exposure_s: float,
-) -> Meeting:
+) -> tuple[Records[Candidate], Array, float]:
     """The lights among each other: at each one's centre its own light, that of the others and what is behind.
 
     Args:
         rows: (m,) the lights as spots.
-        profile: (m, k) irradiance per pixel at the rings, W/m².
+        profile: (m, k) irradiance per pixel at the tabulated radii, W/m².
         law: one row.
-        rings: (k,) radii.
         scale: one row, from electrons to codes.
         behind_e_s: (3,) electrons per second and pixel behind the lights: red, green, blue.
         exposure_s: exposure time.
+
+    Returns:
+        The lights (m,) as a detector meets them; squared distances (m, m) between them, px²; and how many samples are
+        saturated, as an area over all channels in px², overlap not counted.
     """
     lights: Records[Candidate] = np.zeros(len(rows), dtype=_CANDIDATE)  # type: ignore[assignment]  # of records
     distance2 = squared_distances(rows)
@@ -115,7 +102,7 @@ def meet(
         for c in range(3):
             if channel[c] * exposure_s > channel[best] * exposure_s:
                 best = c
-            area = _area_px2(profile[i], channel[c] * per_level, rings)
+            area = _area_px2(profile[i], channel[c] * per_level, law[0])
             total += area
             greatest = max(greatest, area)
         around, own = 0.0, level[i, i] * (channel[best] * exposure_s)
@@ -129,22 +116,23 @@ def meet(
         light.noise_dn = _noise_dn(own + around, scale[0])
         light.radius_px, light.width_px = math.sqrt(greatest / math.pi), rows[i].sigma_px
         light.flux, light.red = own, best == 0
-    return Meeting(lights, distance2, total)
+    return lights, distance2, total
 
 
 @compiled
 def level_at(profile: Array, distance2_px2: Array, law: Records[SpreadLaw]) -> Array:
     """(m, m) irradiance per pixel at squared distances (m, m) from lights with profiles (m, k) along the second axis.
 
-    Taken at the nearest tabulated radius; the radii are 22 % apart.
+    Taken at the nearest tabulated radius; the radii are 22 % apart. Distances are the same both ways.
     """
-    value = np.empty((len(distance2_px2), len(profile)))
-    first2, per_log2 = law[0].first_px2, law[0].per_log_px2
+    value = np.empty(distance2_px2.shape)
+    first2, per_log2 = law[0].radius_px[0] * law[0].radius_px[0], law[0].per_log_px2
     last = profile.shape[1] - 1
     for i in range(len(distance2_px2)):
-        for j in range(len(profile)):
+        for j in range(i, len(profile)):
             place = math.log(max(distance2_px2[i, j], first2) / first2) * per_log2
-            value[i, j] = profile[j, min(int(place + 0.5), last)]
+            nearest = min(int(place + 0.5), last)
+            value[i, j], value[j, i] = profile[j, nearest], profile[i, nearest]
     return value
 
 
@@ -153,20 +141,20 @@ def squared_distances(lights: Records[Spot] | Records[Candidate]) -> Array:
     """(m, m) squared distances between the pixels of lights (m,)."""
     distance2 = np.empty((len(lights), len(lights)))
     for i in range(len(lights)):
-        for j in range(len(lights)):
+        for j in range(i, len(lights)):
             one, other = lights[i].pixel, lights[j].pixel
             x, y = one[0] - other[0], one[1] - other[1]
-            distance2[i, j] = x * x + y * y
+            distance2[i, j] = distance2[j, i] = x * x + y * y
     return distance2
 
 
 @compiled
-def saturate(rows: Records[Spot], profile: Array, rings: Records[Ring], level_e_s: float) -> Array:
+def saturate(rows: Records[Spot], profile: Array, law: Records[SpreadLaw], level_e_s: float) -> Array:
     """(m, 3) area in px² of spots (m,) with profiles (m, k) above a level in electrons per second, per channel."""
     area = np.empty((len(rows), 3))
     for i in range(len(rows)):
         for c in range(3):
-            area[i, c] = _area_px2(profile[i], rows[i].channel[c] * (2.5 / level_e_s), rings)
+            area[i, c] = _area_px2(profile[i], rows[i].channel[c] * (2.5 / level_e_s), law[0])
     return area
 
 
@@ -189,11 +177,13 @@ def noise_dn(electrons: Array, scale: Records[CodeScale]) -> Array:
 
 
 @compiled
-def _area_px2(profile: Array, per_w: float, rings: Records[Ring]) -> float:
+def _area_px2(profile: Array, per_w: float, law: SpreadLaw) -> float:
     """Area above a level 2.5 / `per_w`: of each ring the part between 0 and 1 by which it is above."""
-    area = 0.0
-    for k in range(len(rings)):
-        area += min(max(profile[k] * per_w - 2.0, 0.0), 1.0) * rings[k].area_px2
+    area, ring_px2 = 0.0, law.ring_px2
+    for k in range(len(profile)):
+        above = profile[k] * per_w - 2.0
+        if above > 0.0:
+            area += min(above, 1.0) * ring_px2[k]
     return area
 
 

@@ -96,11 +96,11 @@ def meet(
     """
     scale = lit.scale(gain)
     behind_e_s = lit.behind_e_s(view) if ground_e_s is None else ground_e_s
-    met = lit.spots.meet(spots, scale, exposure_s, behind_e_s)
-    share = met.saturated_px2 / lit.spots.samples
+    lights, distance2_px2, saturated_px2 = lit.spots.meet(spots, scale, exposure_s, behind_e_s)
+    share = saturated_px2 / lit.spots.samples
     if ground_e_s is None and lit.is_day:
         share += veil_share(behind_e_s * exposure_s, scale.saturated_e)
-    seen = Candidates(met.lights, met.distance2_px2)
+    seen = Candidates(lights, distance2_px2)
     if view.beam is not None:
         seen = with_flash(lit, spots, seen, scale, exposure_s, flash_model or FlashModelCfg())
     if view.flakes is not None:

@@ -7,21 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvdock.core.arrays import Array, IntArray
+from auvdock.core.arrays import Array, BoolArray
 from auvdock.numeric.records import Records
 from auvdock.optics.arrival import Arrival
 from auvdock.optics.halo import halo_of
 from auvdock.optics.lens import Lens
-from auvdock.optics.meeting import Meeting, level_at, meet, saturate
+from auvdock.optics.meeting import Candidate, level_at, meet, saturate
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
-from auvdock.optics.spread import HaloPlaces, Ring, Spot, SpreadLaw, profiles, spread
+from auvdock.optics.spread import RADII, HaloPlaces, Spot, SpreadLaw, profiles, spread
 from auvdock.optics.water import WaterCfg
 
 __all__ = ["FlashLines", "SpotModel", "Spots"]
-
-_RADII = 32
 
 
 class FlashLines(NamedTuple):
@@ -62,7 +60,7 @@ class SpotModel:
 
     Attributes:
         radii_px: (k,) radii at which profiles are tabulated.
-        rings: (k,) the same with their areas.
+        ring_px2: (k,) areas of the rings that they stand for.
         law: how light spreads, one row.
         samples: number of the image's samples, three per pixel.
     """
@@ -81,11 +79,10 @@ class SpotModel:
                 again as the core.
         """
         self.lights = lights
-        radii = np.geomspace(0.35, 0.45 * lens.camera.width_px, _RADII)
+        radii = np.geomspace(0.35, 0.45 * lens.camera.width_px, RADII)
         edges = np.concatenate([[0.0], np.sqrt(radii[1:] * radii[:-1]), radii[-1:]])
         self.radii_px: Array = radii
-        self.rings: Records[Ring] = Ring.zeros(_RADII)
-        self.rings["radius_px"], self.rings["area_px2"] = radii, math.pi * np.diff(edges**2)
+        self.ring_px2: Array = math.pi * np.diff(edges**2)
         table, lens_px2 = halo_of(water), cfg.lens_sigma_px**2
         seen_px = np.sqrt(radii**2 + 1.5 * (lens_px2 + smoothing_px2)) if smoothing_px2 > 0.0 else radii
         self._halo = table.density_rows(seen_px * lens.rad_per_px) * lens.rad_per_px**2
@@ -94,7 +91,8 @@ class SpotModel:
             lens_px2=lens_px2 + smoothing_px2,
             face_px2_m2=(cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2,
             aperture_m2=lens.aperture_m2,
-            first_px2=float(radii[0]) ** 2,
+            radius_px=radii,
+            ring_px2=self.ring_px2,
             per_log_px2=0.5 / math.log(radii[1] / radii[0]),
         ).packed()
         self._law = SpreadLaw.read(self.law)
@@ -104,17 +102,17 @@ class SpotModel:
         """(n,) standard deviation of the core on the sensor."""
         return np.sqrt(self._law.lens_px2 + self._law.face_px2_m2 / (range_m * range_m))
 
-    def spread(self, arrivals: Records[Arrival], index: IntArray) -> Spots:
-        """Lights `index` (m,) of those that arrive, as spots."""
-        return Spots(*spread(index, arrivals, self.lights.lamps, self.law, self.rings, self._halo))
+    def spread(self, arrivals: Records[Arrival], shown: BoolArray) -> Spots:
+        """Of the lights (n,) that arrive those that are shown (n,), as spots."""
+        return Spots(*spread(arrivals, shown, self.lights.lamps, self.law, self._halo))
 
     def profiles(self, arrivals: Records[Arrival]) -> Array:
         """(n, k) profiles of lights (n,), 0 for those that are not on the sensor."""
-        return profiles(arrivals, self.law, self.rings, self._halo)
+        return profiles(arrivals, self.law, self._halo)
 
     def saturated_area_px2(self, spots: Spots, level_e_s: float) -> Array:
         """(m, 3) area of each spot above a level in electrons per second, per channel; overlap is not counted."""
-        return saturate(spots.rows, spots.profile, self.rings, level_e_s)
+        return saturate(spots.rows, spots.profile, self.law, level_e_s)
 
     def share(self, area_px2: Array) -> float:
         """Share of the image's samples that areas (m, 3) are."""
@@ -124,6 +122,13 @@ class SpotModel:
         """(m, m) irradiance per pixel at squared distances (m, m) from the lights along the second axis."""
         return level_at(spots.profile, distance2_px2, self.law)
 
-    def meet(self, spots: Spots, scale: SensorScale, exposure_s: float, behind_e_s: Array) -> Meeting:
-        """The lights among each other, before `behind_e_s` (3,) electrons per second and pixel."""
-        return meet(spots.rows, spots.profile, self.law, self.rings, scale.law, behind_e_s, exposure_s)
+    def meet(
+        self, spots: Spots, scale: SensorScale, exposure_s: float, behind_e_s: Array
+    ) -> tuple[Records[Candidate], Array, float]:
+        """The lights (m,) among each other, before `behind_e_s` (3,) electrons per second and pixel.
+
+        Returns:
+            The lights as a detector meets them, squared distances (m, m) between them, and the saturated area, all in
+            px, as `meeting.meet`.
+        """
+        return meet(spots.rows, spots.profile, self.law, scale.law, behind_e_s, exposure_s)

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
-from auvdock.core.arrays import Array, IntArray
+from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import LEAST_EXPONENT
 from auvdock.numeric.records import Record, Records
 from auvdock.optics.arrival import Arrival, Lamp
 
-__all__ = ["HaloPlaces", "Ring", "Spot", "Spread", "SpreadLaw", "place_in_halo", "profiles", "spread"]
+__all__ = ["RADII", "HaloPlaces", "Spot", "SpreadLaw", "place_in_halo", "profiles", "spread"]
+
+RADII = 32
+"""Radii at which profiles are tabulated."""
 
 
 @dataclass(frozen=True)
@@ -41,19 +44,12 @@ class SpreadLaw(Record):
     """Variance of the core by the lamp's face at 1 m."""
     aperture_m2: float
     """Area of the entrance pupil times the lens' transmission."""
-    first_px2: float
-    """Square of the first tabulated radius."""
+    radius_px: Annotated[Array, RADII]
+    """Where profiles are tabulated."""
+    ring_px2: Annotated[Array, RADII]
+    """Area of the ring that each radius stands for."""
     per_log_px2: float
     """Tabulated radii per unit of ln r²."""
-
-
-@dataclass(frozen=True)
-class Ring(Record):
-    """A radius at which profiles are tabulated."""
-
-    radius_px: float
-    area_px2: float
-    """Area of the ring that it stands for."""
 
 
 @dataclass
@@ -73,75 +69,66 @@ class Spot(Record):
     """Electrons per second for 1 W/m² on a pixel: red, green, blue."""
 
 
-class Spread(NamedTuple):
-    """Lights as spots.
-
-    Attributes:
-        rows: (m,) the lights.
-        profile: (m, k) irradiance per pixel at the radii of the rings, W/m².
-    """
-
-    rows: Records[Spot]
-    profile: Array
-
-
 _SPOT = Spot.dtype()
 
 
 @compiled
 def spread(
-    index: IntArray,
-    arrivals: Records[Arrival],
-    lamps: Records[Lamp],
-    law: Records[SpreadLaw],
-    rings: Records[Ring],
-    halo: Array,
-) -> Spread:
-    """Lights `index` (m,) of n as spots.
+    arrivals: Records[Arrival], shown: BoolArray, lamps: Records[Lamp], law: Records[SpreadLaw], halo: Array
+) -> tuple[Records[Spot], Array]:
+    """Those m of n lights that are shown, as spots.
 
     Args:
-        index: which lights.
         arrivals: (n,) light at the camera.
+        shown: (n,) which lights.
         lamps: (n,) where it comes from.
         law: one row.
-        rings: (k,) radii.
-        halo: (h, k) halo of unit light per pixel at the rings, by b r.
+        halo: (h, k) halo of unit light per pixel at the tabulated radii, by b r.
+
+    Returns:
+        The lights (m,), and their profiles (m, k): irradiance per pixel at those radii, W/m².
     """
-    rows: Records[Spot] = np.empty(len(index), dtype=_SPOT)  # type: ignore[assignment]  # of records
-    profile = np.empty((len(index), len(rings)))
-    for i in range(len(index)):
-        light = index[i]
+    count = 0
+    for light in range(len(shown)):
+        count += shown[light]
+    rows: Records[Spot] = np.empty(count, dtype=_SPOT)  # type: ignore[assignment]  # of records
+    profile = np.empty((count, RADII))
+    i = -1
+    for light in range(len(shown)):
+        if not shown[light]:
+            continue
+        i += 1
         arrival, row = arrivals[light], rows[i]
         row.lamp, row.core_w_m2, row.halo_w_m2 = light, arrival.core_w_m2, arrival.halo_w_m2
         for axis in range(2):
             row.pixel[axis] = arrival.pixel[axis]
         for c in range(3):
             row.channel[c] = lamps[light].electrons_per_j[c] * law[0].aperture_m2
-        row.sigma_px = _put_profile(profile[i], arrival, law[0], rings, halo)
-    return Spread(rows, profile)
+        row.sigma_px = _put_profile(profile[i], arrival, law[0], halo)
+    return rows, profile
 
 
 @compiled
-def profiles(arrivals: Records[Arrival], law: Records[SpreadLaw], rings: Records[Ring], halo: Array) -> Array:
+def profiles(arrivals: Records[Arrival], law: Records[SpreadLaw], halo: Array) -> Array:
     """(n, k) profiles of lights (n,), 0 for those that are not on the sensor: `spread` for planners."""
-    profile = np.zeros((len(arrivals), len(rings)))
+    profile = np.zeros((len(arrivals), RADII))
     for i in range(len(arrivals)):
         if arrivals[i].inside:
-            _put_profile(profile[i], arrivals[i], law[0], rings, halo)
+            _put_profile(profile[i], arrivals[i], law[0], halo)
     return profile
 
 
 @compiled
-def _put_profile(profile: Array, arrival: Arrival, law: SpreadLaw, rings: Records[Ring], halo: Array) -> float:
+def _put_profile(profile: Array, arrival: Arrival, law: SpreadLaw, halo: Array) -> float:
     """Put a light's profile (k,) there; σ of its core."""
     row, weight = _place(arrival.scattering_depth, law.halo)
     sigma2 = law.lens_px2 + law.face_px2_m2 / (arrival.range_m * arrival.range_m)
     peak = arrival.core_w_m2 / (2.0 * math.pi * sigma2)
-    below, above = halo[row], halo[row + 1]
-    for k in range(len(rings)):
-        profile[k] = (below[k] + weight * (above[k] - below[k])) * arrival.halo_w_m2
-    for k in range(len(rings)):
-        exponent = -0.5 * (rings[k].radius_px * rings[k].radius_px) / sigma2
+    below, above, light, radius = halo[row], halo[row + 1], arrival.halo_w_m2, law.radius_px
+    for k in range(RADII):
+        profile[k] = (below[k] + weight * (above[k] - below[k])) * light
+    for k in range(RADII):
+        exponent = -0.5 * (radius[k] * radius[k]) / sigma2
         if exponent <= LEAST_EXPONENT:
             break
         profile[k] += peak * math.exp(exponent)

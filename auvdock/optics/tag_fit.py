@@ -72,7 +72,7 @@ def observe_landing(
         camera.reset(rng.spawn(1)[0])
         shot = camera.take(pose, 0.0)
         view = shot.view
-        spots = lit.spots.spread(view.arrivals, view.inside.nonzero()[0])
+        spots = lit.spots.spread(view.arrivals, view.inside)
         below = np.median(ground.electrons_per_s(view.T_world_camera), axis=0)
         seen, _ = meet(lit, view, spots, shot.exposure_s, shot.gain, ground_e_s=below)
         if len(seen.lights):

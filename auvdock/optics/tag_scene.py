@@ -112,8 +112,8 @@ class TagScene:
 
     def _halos_e_s(self, view: View, ray_camera: Array) -> Array:
         """(3,) light of the lamps' halos and cores in the direction of the tag, on the sensor or off it."""
-        lit, model = np.flatnonzero(view.in_sight), self.lit.spots
-        if len(lit) == 0:
+        lit, model = view.in_sight, self.lit.spots
+        if not lit.any():
             return np.zeros(3)
         spots = model.spread(view.arrivals, lit)
         angle = np.arccos(np.clip(view.arrivals["ray_camera"][lit] @ ray_camera, -1.0, 1.0))

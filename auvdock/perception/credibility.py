@@ -29,6 +29,9 @@ from auvdock.core.arrays import Array, IntArray
 from auvdock.core.camera import Camera
 from auvdock.core.checked import Checked
 from auvdock.core.limits import OpenShare, Positive
+from auvdock.numeric.compiled import compiled
+from auvdock.numeric.lights import Solution
+from auvdock.numeric.records import Records
 from auvdock.perception.pnp import PnpSolution
 
 __all__ = ["Credibility", "CredibilityCfg"]
@@ -85,6 +88,7 @@ class Credibility:
         self._camera = camera
         self._blue_m = blue_m
         self._attitude_sigma_rad = attitude_sigma_rad
+        self._attitude_rad2 = attitude_sigma_rad**2
         known = 3 if attitude_sigma_rad > 0.0 else 0
         self._freedom = [2.0 * lights + known - 6.0 for lights in range(len(blue_m) + 1)]
         self._worst_fit = [float(chdtri(f, cfg.fit_probability)) if f > 0 else math.inf for f in self._freedom]
@@ -102,15 +106,11 @@ class Credibility:
         and twice the greatest σ of the position counts in place of σ_r.
         """
         cfg = self._cfg
-        position = solution.T_station_camera()[:3, 3]
-        range_m = math.sqrt(float(position @ position))
+        range_m, variance = _along_sight(solution.record)
         if solution.cost > self._worst_fit[solution.lights_n] or range_m > cfg.max_range_m:
             return False
-        covariance = solution.covariance()[:3, :3]
-        if heading_known:
-            variance = float(position @ covariance @ position) / range_m**2
-        else:
-            variance = 4.0 * float(np.linalg.eigvalsh(covariance)[-1])
+        if not heading_known:
+            variance = 4.0 * float(np.linalg.eigvalsh(solution.covariance()[:3, :3])[-1])
         return variance <= max(cfg.max_range_sigma_m, cfg.max_range_sigma * range_m) ** 2
 
     def expected_cost(self, lights: int) -> float:
@@ -130,14 +130,9 @@ class Credibility:
             way_m: (3,) way since then in the station frame.
             elapsed_s: time since then.
         """
-        step = solution.T_station_camera()[:3, 3] - before.T_station_camera()[:3, 3] - way_m
-        length_m = math.sqrt(float(step @ step))
+        length_m, variance = _step_off(solution.record, before.record, way_m, self._attitude_rad2)
         excess_m = length_m - self._cfg.speed_error_m_s * elapsed_s
-        if excess_m <= 0.0:
-            return True
-        along = step / length_m
-        variance = self._noise_along(solution, along) + self._noise_along(before, along)
-        return excess_m**2 <= self._worst_step * variance
+        return excess_m <= 0.0 or excess_m**2 <= self._worst_step * variance
 
     def is_alone(self, solution: PnpSolution, mirrored: PnpSolution | None) -> bool:
         """Whether a pose is far likelier than the other pose of its plane, or both are one.
@@ -166,23 +161,7 @@ class Credibility:
             noise: what was known before, and what the lights were solved with: σ of √noise σ_px.
             solution: a pose, believed or not.
         """
-        freedom = 2.0 * solution.lights_n - 6.0
-        if self._attitude_sigma_rad > 0.0:
-            by_prior = solution.covariance()[3:, 3:].ravel() / self._attitude_sigma_rad**2
-            freedom += min(float(by_prior @ by_prior), 3.0)
-        if freedom <= 0.0:
-            return noise
-        shown = min(_NOISE_MARGIN * solution.lights_cost / freedom, _MOST_SURPRISE)
-        return min(max(noise * (1.0 + (shown - 1.0) / _NOISE_FRAMES), _LEAST_NOISE), _GREATEST_NOISE)
-
-    def _noise_along(self, solution: PnpSolution, along: Array) -> float:
-        """Variance of the position along a direction (3,) that the noise of the lights makes, m²."""
-        covariance = solution.covariance()
-        variance = float(along @ covariance[:3, :3] @ along)
-        if self._attitude_sigma_rad > 0.0:
-            by_attitude = along @ covariance[:3, 3:]
-            variance -= float(by_attitude @ by_attitude) / self._attitude_sigma_rad**2
-        return max(variance, 0.0)
+        return _noise_after(noise, solution.record, 2.0 * solution.lights_n - 6.0, self._attitude_rad2)
 
     def log_odds(
         self,
@@ -244,3 +223,58 @@ class Credibility:
             cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
             by_pose = by_point @ np.hstack([-solution.rotation, cross])
             yield others_px - place, by_pose @ covariance @ by_pose.T + sigma_px**2 * np.eye(2)
+
+
+@compiled
+def _along_sight(solution: Records[Solution]) -> tuple[float, float]:
+    """Distance of the camera from the station, and the variance of its position along that line, m²."""
+    T, covariance = solution[0].T_station_camera, solution[0].covariance
+    square = variance = 0.0
+    for i in range(3):
+        square += T[i, -1] * T[i, -1]
+        for j in range(3):
+            variance += T[i, -1] * covariance[i, j] * T[j, -1]
+    return math.sqrt(square), variance / square
+
+
+@compiled
+def _step_off(
+    solution: Records[Solution], before: Records[Solution], way_m: Array, attitude_rad2: float
+) -> tuple[float, float]:
+    """Length of the step between two poses less the way (3,), and the variance along it by both poses' lights, m²."""
+    step, square = np.empty(3), 0.0
+    for i in range(3):
+        step[i] = solution[0].T_station_camera[i, -1] - before[0].T_station_camera[i, -1] - way_m[i]
+        square += step[i] * step[i]
+    length_m = math.sqrt(square)
+    for i in range(3):
+        step[i] /= length_m
+    variance = _noise_along(solution[0], step, attitude_rad2) + _noise_along(before[0], step, attitude_rad2)
+    return length_m, variance
+
+
+@compiled
+def _noise_along(solution: Solution, along: Array, attitude_rad2: float) -> float:
+    """Variance of the position along a direction (3,) that the noise of the lights makes, m²."""
+    variance, covariance = 0.0, solution.covariance
+    for j in range(3):
+        by_attitude = 0.0
+        for i in range(3):
+            variance += along[i] * covariance[i, j] * along[j]
+            by_attitude += along[i] * covariance[i, 3 + j]
+        if attitude_rad2 > 0.0:
+            variance -= by_attitude * by_attitude / attitude_rad2
+    return max(variance, 0.0)
+
+
+@compiled
+def _noise_after(noise: float, solution: Records[Solution], freedom: float, attitude_rad2: float) -> float:
+    """`Credibility.noise_after` where lights alone have so many degrees of freedom."""
+    if attitude_rad2 > 0.0:
+        # How many of the rotation's three numbers the prior decides: tr (P Σ)².
+        by_prior = (solution[0].covariance[3:, 3:] / attitude_rad2).ravel()
+        freedom += min(np.dot(by_prior, by_prior), 3.0)
+    if freedom <= 0.0:
+        return noise
+    shown = min(_NOISE_MARGIN * solution[0].lights_cost / freedom, _MOST_SURPRISE)
+    return min(max(noise * (1.0 + (shown - 1.0) / _NOISE_FRAMES), _LEAST_NOISE), _GREATEST_NOISE)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.lights import Light
-from auvdock.numeric.records import Record, Records, new_rows
+from auvdock.numeric.records import Record, Records
 from auvdock.numeric.tracks import Track
 
 __all__ = ["Owner", "gather_lights"]
@@ -27,9 +27,6 @@ class Owner(Record):
     """The array's beacon."""
 
 
-_LIGHT, _OWNER = Light.dtype(), Owner.dtype()
-
-
 @compiled
 def gather_lights(
     tracks: Records[Track],
@@ -38,7 +35,9 @@ def gather_lights(
     size_px: tuple[int, int],
     array_m: Array,
     sigma_px: float,
-) -> tuple[Records[Light], Records[Owner], int]:
+    lights: Records[Light],
+    owners: Records[Owner],
+) -> tuple[int, int]:
     """The array beacons among the tracks, in the order of their ids.
 
     Those that were seen in this frame if they are four or more; else predicted ones as well, at their track's place and
@@ -46,15 +45,17 @@ def gather_lights(
     part that is left: off by up to half of the box.
 
     Args:
-        tracks: (n,) tracks.
+        tracks: (n,) tracks, each beacon carried by one at most.
         centre_px: (m, 2) this frame's detections.
         xyxy: (m, 4) their boxes, px.
         size_px: width and height of the picture.
         array_m: (k, 3) array beacons in the station frame.
         sigma_px: σ of a detection.
+        lights: (k,) the first rows take the lights, as `PnpSolver.solve_lights` takes them.
+        owners: (k,) the first rows take whose they are.
 
     Returns:
-        Lights (l,) as `PnpSolver.solve_lights` takes them; whose they are (l,); how many were seen.
+        How many lights there are, and how many were seen.
     """
     seen = carried = 0
     for i in range(len(tracks)):
@@ -63,8 +64,6 @@ def gather_lights(
             if tracks[i].detection >= 0:
                 seen += 1
     count = seen if seen >= _MIN_SEEN else carried
-    lights: Records[Light] = new_rows(count, dtype=_LIGHT)
-    owners: Records[Owner] = new_rows(count, dtype=_OWNER)
     row = 0
     for beacon in range(len(array_m)):
         for i in range(len(tracks)):
@@ -86,4 +85,4 @@ def gather_lights(
                 if left <= 0.0 or top <= 0.0 or right >= size_px[0] - 1 or bottom >= size_px[1] - 1:
                     light.sigma_px += 0.5 * max(right - left, bottom - top)
             row += 1
-    return lights, owners, seen
+    return count, seen

@@ -136,7 +136,7 @@ class BeaconPerception:
             if self._forward.mask.any():
                 fixed = detections.select(~self._forward.mask)
         tracks.update(fixed)
-        velocity = self._camera_body @ proprioception.velocity_ground_m_s
+        velocity = self._camera_body.dot(proprioception.velocity_ground_m_s)
         heading, sigma = (None, None) if self._surveyed else self._heading(proprioception)
         attitude = Attitude(self._prior.rotation(proprioception, heading), sigma)
         associated = self._association.update(tracks, fixed, attitude, velocity)

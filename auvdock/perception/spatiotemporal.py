@@ -15,7 +15,7 @@ from auvdock.numeric.records import Records
 from auvdock.perception.association import Associated, pose_estimate
 from auvdock.perception.authentication import AuthenticationCfg, Authenticator
 from auvdock.perception.credibility import Credibility, CredibilityCfg
-from auvdock.perception.labelled import gather_lights
+from auvdock.perception.labelled import Owner, gather_lights
 from auvdock.perception.pnp import Attitude, PnpCfg, PnpSolution, PnpSolver
 from auvdock.perception.tracker import LightTracker
 
@@ -59,6 +59,7 @@ class SpatiotemporalAssociation:
         self._sigma_px = pixel_sigma_px
         self._camera = camera
         self._array_m = np.ascontiguousarray(layout.array_positions_m)
+        self._lights, self._owners = Light.zeros(len(self._array_m)), Owner.zeros(len(self._array_m))
         self._rate_hz = camera.rate_hz
         self._size_px = (camera.width_px, camera.height_px)
         self._focal_px = float(camera.matrix[0, 0])
@@ -95,7 +96,7 @@ class SpatiotemporalAssociation:
         sigma = attitude.heading_sigma_rad
         self._heading_known = sigma is None or sigma <= self._attitude_sigma_rad
         self._age += 1
-        self._way_m = attitude.rotation.T @ velocity_m_s * (self._age / self._rate_hz)
+        self._way_m = attitude.rotation.T.dot(velocity_m_s) * (self._age / self._rate_hz)
         if self._age > _MAX_POSE_AGE:
             self._last = self._believed = None
             self._noise = 1.0
@@ -113,17 +114,19 @@ class SpatiotemporalAssociation:
 
     def _solve_labelled(self, tracks: LightTracker, detections: Detections, prior: Attitude) -> Associated | None:
         """Pose from the tracks that carry an identity; clears all identities and returns None if it does not hold."""
-        lights, owners, seen = gather_lights(
+        count, seen = gather_lights(
             tracks.table,
             detections.centre_px,
             detections.xyxy,
             self._size_px,
             self._array_m,
             self._sigma_px * math.sqrt(self._noise),
+            self._lights,
+            self._owners,
         )
-        count = len(lights)
         if count == 0:
             return None
+        lights, owners = self._lights[:count], self._owners[:count]
         enough = count >= 4 or (seen == _MIN_LIT and self._last is not None)
         if not enough:
             if count < _MIN_LIT:

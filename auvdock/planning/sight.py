@@ -80,7 +80,9 @@ class Sight:
     def profiles(self, arrivals: Records[Arrival]) -> Floats:
         """(m, n, k) irradiance per pixel at `SpotModel.radii_px` as the detector smooths it; 0 off the sensor."""
         return (
-            self._smoothed.profiles(arrivals).astype(np.float32).reshape(-1, self.lights.count, len(self.spots.rings))
+            self._smoothed.profiles(arrivals)
+            .astype(np.float32)
+            .reshape(-1, self.lights.count, len(self.spots.radii_px))
         )
 
     def sensitivity_s(self, profile: Floats, pixels: Array) -> Array:
@@ -98,7 +100,7 @@ class Sight:
         low, high = exposure.min_s, exposure.max_s * exposure.max_gain
         gap2 = np.sum((pixels[:, :, None] - pixels[:, None]) ** 2, axis=3).astype(np.float32)
         radii = self.spots.radii_px[_EVERY]
-        area = np.add.reduceat(self.spots.rings["area_px2"], np.arange(0, rings, 2))
+        area = np.add.reduceat(self.spots.ring_px2, np.arange(0, rings, 2))
         level = np.zeros((m, n, len(radii)), dtype=np.float32)
         sharing = np.zeros_like(level)
         lit = profile[:, :, 0] > 0.0

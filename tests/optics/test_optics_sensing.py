@@ -191,15 +191,15 @@ def test_lights_meet_as_their_profiles_say(range_m, encoding):
     """The compiled sums over lights and rings against the same in NumPy, 1e-9."""
     lit = sensor(imaging=ImagingCfg(encoding=encoding)).lit
     view, model, scale = lit.look(pose(range_m), 0.0), lit.spots, lit.scale(2.0)
-    spots, behind_e_s = model.spread(view.arrivals, view.inside.nonzero()[0]), np.array([1e4, 2e4, 3e4])
-    met = model.meet(spots, scale, 0.01, behind_e_s)
-    lights, pixels, rings = met.lights, view.pixels[view.inside], model.rings
+    spots, behind_e_s = model.spread(view.arrivals, view.inside), np.array([1e4, 2e4, 3e4])
+    lights, distance2_px2, saturated_px2 = model.meet(spots, scale, 0.01, behind_e_s)
+    pixels, radii_px = view.pixels[view.inside], model.radii_px
     assert len(pixels) > 0
     channel = spots.rows["channel"] * 0.01
     above = np.clip(spots.profile[:, :, None] * channel[:, None] * (2.5 / scale.saturated_e) - 2.0, 0.0, 1.0)
-    area = np.einsum("mkc,k->mc", above, rings["area_px2"])
+    area = np.einsum("mkc,k->mc", above, model.ring_px2)
     gap2 = np.sum((pixels[:, None] - pixels[None]) ** 2, axis=2)
-    nearest = np.abs(0.5 * np.log(np.maximum(gap2, rings["radius_px"][0] ** 2))[..., None] - np.log(rings["radius_px"]))
+    nearest = np.abs(0.5 * np.log(np.maximum(gap2, radii_px[0] ** 2))[..., None] - np.log(radii_px))
     best, light = channel.argmax(axis=1), np.arange(len(pixels))
     level = spots.profile[light, nearest.argmin(axis=2)] * channel.T[best]
     own = np.diag(level)
@@ -207,13 +207,13 @@ def test_lights_meet_as_their_profiles_say(range_m, encoding):
     bright, dark = (np.minimum(scale.codes(e), 255.0) for e in (own + around, around))
     np.testing.assert_array_equal(lights["pixel"], pixels)
     np.testing.assert_array_equal(lights["red"], best == 0)
-    np.testing.assert_allclose(met.distance2_px2, gap2, atol=1e-9)
+    np.testing.assert_allclose(distance2_px2, gap2, atol=1e-9)
     np.testing.assert_allclose(lights["flux"], own, rtol=1e-12)
     np.testing.assert_allclose(lights["surround_dn"], dark, rtol=1e-9)
     np.testing.assert_allclose(lights["contrast_dn"], bright - dark, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(lights["noise_dn"], scale.noise_dn(own + around), rtol=1e-12)
     np.testing.assert_allclose(lights["radius_px"], np.sqrt(area.max(axis=1) / np.pi), rtol=1e-12)
-    assert met.saturated_px2 == pytest.approx(float(area.sum()), rel=1e-12)
+    assert saturated_px2 == pytest.approx(float(area.sum()), rel=1e-12)
     np.testing.assert_allclose(model.saturated_area_px2(spots, scale.saturated_e / 0.01), area, rtol=1e-12)
 
 

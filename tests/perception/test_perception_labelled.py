@@ -14,8 +14,9 @@ from auvdock.core.arrays import Array
 from auvdock.core.camera import CameraCfg, make_camera
 from auvdock.core.contracts import Proprioception
 from auvdock.core.transforms import rotation_from_euler_zyx
+from auvdock.numeric.lights import Light
 from auvdock.numeric.tracks import Track
-from auvdock.perception.labelled import gather_lights
+from auvdock.perception.labelled import Owner, gather_lights
 from auvdock.perception.prior import AttitudePrior
 
 
@@ -33,7 +34,9 @@ def test_lights_are_those_that_numpy_finds(seed: int, tracks: int, seen_share: f
     table = Track.zeros(tracks)
     table["centre_px"], table["p00_px2"] = place, variance
     table["beacon_id"], table["detection"] = beacon, detection
-    lights, owners, seen = gather_lights(table, centre_px, xyxy, (640, 360), array_m, 0.5)
+    lights, owners = Light.zeros(8), Owner.zeros(8)
+    count, seen = gather_lights(table, centre_px, xyxy, (640, 360), array_m, 0.5, lights, owners)
+    lights, owners = lights[:count], owners[:count]
 
     rows = np.flatnonzero(beacon >= 0)
     rows = rows[np.argsort(beacon[rows])]
