@@ -188,18 +188,15 @@ class ConicalPilot:
 
     def place(self, relative: RelativeState, senses: Senses) -> Place:
         """Where the nose is in approach axes."""
-        axis_yaw_rad = relative.axis_yaw_rad
-        heading = senses.yaw_rad - axis_yaw_rad
-        x, y, z = senses.level(heading, self._camera_to_nose)
-        px, py, pz = relative.camera_m
+        (distance_m, y, up_m), axis_yaw_rad = relative.station_point(senses, self._camera_to_nose)
         # Flying in means looking along -x of the station: port is then -y.
-        port_m, up_m = -(py + y), pz + z
+        port_m = -y
         return Place(
-            px + x,
+            distance_m,
             port_m,
             up_m,
             axis_yaw_rad + math.pi,
-            math.remainder(heading - math.pi, math.tau),
+            math.remainder(senses.yaw_rad - axis_yaw_rad - math.pi, math.tau),
             math.hypot(port_m, up_m),
         )
 

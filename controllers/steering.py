@@ -229,7 +229,7 @@ def along_axis(
     """
     turn = math.remainder(senses.yaw_rad - place.axis_yaw_rad, math.tau)
     (surge, sway, heave), offset, integrals = axis_course(
-        law, tuple(place), integrals, hold, committed, lookahead_m, turn, current_m_s
+        law, place[:], integrals, hold, committed, lookahead_m, turn, current_m_s
     )
     setpoint = AutopilotSetpoint(surge, sway, heave, 0.0, place.axis_yaw_rad + offset)
     return Steering(setpoint, Line(integrals, offset))

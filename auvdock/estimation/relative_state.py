@@ -24,6 +24,7 @@ from auvdock.estimation.relative_update import (
     RelativeBelief,
     RelativeLaw,
     advance,
+    station_point,
 )
 from auvdock.estimation.senses import Senses, Vector
 from auvdock.numeric.records import Records, new_rows
@@ -105,6 +106,11 @@ class RelativeState(NamedTuple):
         """Standard deviation across the axis, the worse of sideways and vertical."""
         covariance = self.belief["covariance"]
         return math.sqrt(max(covariance.item(0, 1, 1), covariance.item(0, 2, 2), 0.0))
+
+    def station_point(self, senses: Senses, from_camera_m: Vector) -> tuple[Vector, float]:
+        """A point of the vehicle in the station frame, given from the camera in body axes; and `axis_yaw_rad`."""
+        x, y, z = from_camera_m
+        return station_point(self.belief, senses.motion, senses.yaw_rad, x, y, z)
 
 
 class RelativeFilter:

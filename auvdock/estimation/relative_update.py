@@ -14,9 +14,9 @@ from auvdock.numeric.compiled import compiled
 from auvdock.numeric.motion import Motion
 from auvdock.numeric.records import Record, Records
 from auvdock.numeric.rotations import headed, sine_axis
-from auvdock.numeric.scalars import cross, within_pi
+from auvdock.numeric.scalars import Vector, cross, within_pi
 
-__all__ = ["ACCEPTED", "LEFT_OUT", "REFUSED", "RelativeBelief", "RelativeLaw", "advance"]
+__all__ = ["ACCEPTED", "LEFT_OUT", "REFUSED", "RelativeBelief", "RelativeLaw", "advance", "station_point"]
 
 LEFT_OUT, ACCEPTED, REFUSED = 0, 1, 2
 """Verdicts on a measurement: none came or it is not usable; fused; an outlier."""
@@ -113,6 +113,21 @@ def advance(
     if impatient and of_pose == REFUSED:
         return of_pose, LEFT_OUT
     return of_pose, _fuse_bearing(now, yaw_rad, R_level_body, ray, by)
+
+
+@compiled
+def station_point(
+    belief: Records[RelativeBelief], motion: Records[Motion], yaw_rad: float, x_m: float, y_m: float, z_m: float
+) -> tuple[Vector, float]:
+    """`RelativeState.station_point` of a point (x, y, z) from the camera in body axes, and ψ_s."""
+    now = belief[0]
+    R, camera = headed(yaw_rad - now.axis_yaw_rad, motion[0].R_level_body), now.camera_m
+    point_m = (
+        camera[0] + (R[0, 0] * x_m + R[0, 1] * y_m + R[0, 2] * z_m),
+        camera[1] + (R[1, 0] * x_m + R[1, 1] * y_m + R[1, 2] * z_m),
+        camera[2] + (R[2, 0] * x_m + R[2, 1] * y_m + R[2, 2] * z_m),
+    )
+    return point_m, now.axis_yaw_rad
 
 
 @compiled

@@ -95,7 +95,7 @@ def course(place, integrals=(0.0, 0.0), hold=False, committed=False, turn=0.0, c
     distance, port, up = place
     at = Place(distance, port, up, 0.0, turn, math.hypot(port, up))
     velocity, offset, after = axis_course(
-        LAW, tuple(at), integrals, hold, committed, CFG.lookahead_mid_m, turn, np.array([*current, 0.0])
+        LAW, at[:], integrals, hold, committed, CFG.lookahead_mid_m, turn, np.array([*current, 0.0])
     )
     return *velocity, offset, *after
 
