@@ -13,7 +13,6 @@ from auvdock.controllers.control_law import (
     Drag,
     Loop,
     LoopMemory,
-    Wanted,
     agree,
     back_calculate,
     body_wrench,
@@ -26,9 +25,11 @@ from auvdock.core.errors import located
 from auvdock.core.limits import Positive, PositiveShare
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.estimation.senses import Senses, Vector, read_senses
-from auvdock.numeric.records import Records
+from auvdock.numeric.records import Records, new_rows
 
 __all__ = ["Autopilot", "AutopilotCfg", "AutopilotSetpoint", "AutopilotState"]
+
+_MEMORY = LoopMemory.dtype()
 
 
 @dataclass(frozen=True)
@@ -99,12 +100,9 @@ class AutopilotState(NamedTuple):
         return ahead, port, up
 
     @property
-    def current_m_s(self) -> Vector | None:
-        """Smoothed current in world axes, None before the first sample."""
-        if not self.memory["sampled"][0]:
-            return None
-        x, y, z = self.memory["current_m_s"][0].tolist()
-        return x, y, z
+    def current_m_s(self) -> Array:
+        """(3,) smoothed current in world axes, 0 before the first sample; never written to."""
+        return self.memory["current_m_s"][0]
 
     @property
     def integrals(self) -> tuple[float, ...]:
@@ -183,8 +181,9 @@ class Autopilot:
         if setpoint.depth_m is not None:
             bound = self._max_heave_m_s
             heave = min(bound, max(-bound, self._depth_gain * (senses.depth_m - setpoint.depth_m)))
-        wrench, memory = np.zeros(6), LoopMemory.zeros()
-        wanted = Wanted(
+        wrench = np.zeros(6)
+        memory: Records[LoopMemory] = new_rows(1, _MEMORY)
+        wanted = (
             setpoint.surge_m_s,
             setpoint.sway_m_s,
             heave,
@@ -201,6 +200,6 @@ class Autopilot:
         """Anti-windup for what allocation could not give, see `control_law.back_calculate`."""
         if agree(wanted, achieved):
             return state
-        memory = LoopMemory.zeros()
+        memory: Records[LoopMemory] = new_rows(1, _MEMORY)
         back_calculate(memory, state.memory, wanted, achieved, self._loops, self._dt_s)
         return AutopilotState(memory)

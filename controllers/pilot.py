@@ -150,7 +150,7 @@ class ConicalPilot:
         sight = self._look(state.sight, percept, senses)
         place = self.place(relative, senses) if relative is not None else None
         progress = self._progress(state, place, senses.time_s)
-        state = state._replace(relative=relative, sight=sight, progress=progress)
+        state = PilotState(state.autopilot, relative, sight, state.stage, progress, state.line)
         jumped = relative is not None and before is not None and relative.restarts > before.restarts
         return state, place, self._facts(state, place, senses, jumped)
 
@@ -188,25 +188,24 @@ class ConicalPilot:
 
     def place(self, relative: RelativeState, senses: Senses) -> Place:
         """Where the nose is in approach axes."""
-        heading = senses.yaw_rad - relative.axis_yaw_rad
-        x, y, z = senses.level(heading, self._camera_to_nose)
-        px, py, pz = relative.camera_m
+        (distance_m, y, up_m), axis_yaw_rad = relative.station_point(senses, self._camera_to_nose)
         # Flying in means looking along -x of the station: port is then -y.
-        port_m, up_m = -(py + y), pz + z
+        port_m = -y
         return Place(
-            px + x,
+            distance_m,
             port_m,
             up_m,
-            relative.axis_yaw_rad + math.pi,
-            math.remainder(heading - math.pi, math.tau),
+            axis_yaw_rad + math.pi,
+            math.remainder(senses.yaw_rad - axis_yaw_rad - math.pi, math.tau),
             math.hypot(port_m, up_m),
         )
 
     def _progress(self, state: PilotState, place: Place | None, now_s: float) -> Progress:
         """Best distance, when it was reached, and since when the vehicle waits at the gate."""
-        best_m, best_s, gate_s = state.progress
+        last = state.progress
         if place is None:
-            return state.progress
+            return last
+        best_m, best_s, gate_s = last
         modes, distance_m = self.cfg.modes, place.distance_m
         if distance_m < best_m - modes.progress_m:
             best_m, best_s = distance_m, now_s
@@ -214,7 +213,7 @@ class ConicalPilot:
             gate_s = None
         elif gate_s is None:
             gate_s = now_s
-        return Progress(best_m, best_s, gate_s)
+        return Progress(best_m, best_s, gate_s) if best_m != last.best_m or gate_s != last.gate_s else last
 
     def _facts(self, state: PilotState, place: Place | None, senses: Senses, jumped: bool) -> Facts:
         now, relative, sight, progress = senses.time_s, state.relative, state.sight, state.progress
@@ -232,23 +231,23 @@ class ConicalPilot:
             if since_sight_s < 1.0:
                 range_m = sight.trusted_range_m(self.cfg.modes.min_blind_range_m)
         return Facts(
-            latched=senses.latched,
-            fixes=fixes,
-            since_fix_s=since_fix_s,
-            jumped=jumped,
-            distance_m=distance_m,
-            off_axis_m=off_axis_m,
-            allowed_m=allowed_m,
-            heading_error_rad=heading_error_rad,
-            sigma_m=sigma_m,
-            sights=sights,
-            since_sight_s=since_sight_s,
-            range_m=range_m,
-            in_mode_s=now - (state.stage.since_s or 0.0),
-            held_s=now - progress.gate_s if progress.gate_s is not None else 0.0,
-            stalled_s=now - progress.best_s,
-            missed=distance_m < -self._end_m,
-            giving_up=state.stage.giving_up,
+            senses.latched,
+            fixes,
+            since_fix_s,
+            jumped,
+            distance_m,
+            off_axis_m,
+            allowed_m,
+            heading_error_rad,
+            sigma_m,
+            sights,
+            since_sight_s,
+            range_m,
+            now - (state.stage.since_s or 0.0),
+            now - progress.gate_s if progress.gate_s is not None else 0.0,
+            now - progress.best_s,
+            distance_m < -self._end_m,
+            state.stage.giving_up,
         )
 
     def enter(self, state: PilotState, mode: str, place: Place | None, senses: Senses) -> PilotState:
@@ -278,7 +277,7 @@ class ConicalPilot:
 
     def _steer(self, state: PilotState, place: Place | None, senses: Senses) -> Steering:
         cfg, stage, mode = self.cfg, state.stage, state.mode
-        current = state.autopilot.current_m_s or (0.0, 0.0, 0.0)
+        current = state.autopilot.current_m_s
         in_mode_s = senses.time_s - (stage.since_s or 0.0)
         if mode == FAR and state.sight is not None:
             return towards_light(
@@ -332,5 +331,5 @@ class ConicalPilot:
             log["depth_m"] = point.depth_m
         if place is not None:
             log["distance_m"], log["port_m"], log["up_m"] = place.distance_m, place.port_m, place.up_m
-        after = state._replace(autopilot=loops, line=steering.line)
+        after = PilotState(loops, state.relative, state.sight, state.stage, state.progress, steering.line)
         return Command(values, state.mode, log, state.stage.giving_up), after

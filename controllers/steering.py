@@ -11,10 +11,11 @@ from typing import NamedTuple
 from auvdock.controllers.autopilot import AutopilotSetpoint
 from auvdock.controllers.axis_guidance import AxisLaw, Place, axis_course, crab
 from auvdock.controllers.guidance import GuidanceCfg
+from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 from auvdock.core.limits import Positive
-from auvdock.estimation.senses import Senses, Vector
+from auvdock.estimation.senses import Senses
 from auvdock.numeric.records import Records
 from auvdock.numeric.scalars import limited
 
@@ -178,7 +179,7 @@ def towards_light(
     sight: Sight,
     lamp_height_m: float,
     senses: Senses,
-    current_m_s: Vector,
+    current_m_s: Array,
     reach_m_s: float,
     least_range_m: float,
     cfg: GuidanceCfg,
@@ -211,7 +212,7 @@ def along_axis(
     committed: bool,
     lookahead_m: float,
     senses: Senses,
-    current_m_s: Vector,
+    current_m_s: Array,
     law: Records[AxisLaw],
 ) -> Steering:
     """Along the approach axis; see `axis_guidance.axis_course`.
@@ -223,18 +224,18 @@ def along_axis(
         committed: past the gate.
         lookahead_m: of the line of sight.
         senses: the vehicle's own.
-        current_m_s: in world axes.
+        current_m_s: (3,) in world axes.
         law: from `axis_guidance.axis_law`.
     """
     turn = math.remainder(senses.yaw_rad - place.axis_yaw_rad, math.tau)
-    surge, sway, heave, offset, port_integral, up_integral = axis_course(
-        law, place, integrals, hold, committed, lookahead_m, turn, current_m_s
+    (surge, sway, heave), offset, integrals = axis_course(
+        law, place[:], integrals, hold, committed, lookahead_m, turn, current_m_s
     )
     setpoint = AutopilotSetpoint(surge, sway, heave, 0.0, place.axis_yaw_rad + offset)
-    return Steering(setpoint, Line((port_integral, up_integral), offset))
+    return Steering(setpoint, Line(integrals, offset))
 
 
-def back_off(place: Place, senses: Senses, current_m_s: Vector, reach_m_s: float, cfg: GuidanceCfg) -> Steering:
+def back_off(place: Place, senses: Senses, current_m_s: Array, reach_m_s: float, cfg: GuidanceCfg) -> Steering:
     """Backwards along the axis with the hull aligned; inside the funnel straight back."""
     port = up = 0.0
     if place.distance_m > 0.0:
@@ -253,7 +254,7 @@ def ground_course(
     course_rad: float,
     crab_limit_rad: float,
     senses: Senses,
-    current_m_s: Vector,
+    current_m_s: Array,
     reach_m_s: float,
     view_rad: tuple[float, float] = (-math.pi, math.pi),
 ) -> tuple[AutopilotSetpoint, float]:

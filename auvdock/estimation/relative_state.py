@@ -8,7 +8,7 @@ that soaks up the compass' bias too, turns the compass heading into a relative h
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,14 +24,16 @@ from auvdock.estimation.relative_update import (
     RelativeBelief,
     RelativeLaw,
     advance,
+    station_point,
 )
 from auvdock.estimation.senses import Senses, Vector
-from auvdock.numeric.records import Records
+from auvdock.numeric.records import Records, new_rows
 
 __all__ = ["FilterCfg", "RelativeFilter", "RelativeState"]
 
 _NO_POSE, _NO_NOISE = np.full((4, 4), math.nan), np.zeros((6, 6))
 _NO_RAY = np.zeros(3)
+_BELIEF = RelativeBelief.dtype()
 
 
 @dataclass(frozen=True)
@@ -102,8 +104,13 @@ class RelativeState(NamedTuple):
     @property
     def cross_track_sigma_m(self) -> float:
         """Standard deviation across the axis, the worse of sideways and vertical."""
-        covariance = self.covariance
-        return math.sqrt(max(covariance.item(1, 1), covariance.item(2, 2), 0.0))
+        covariance = self.belief["covariance"]
+        return math.sqrt(max(covariance.item(0, 1, 1), covariance.item(0, 2, 2), 0.0))
+
+    def station_point(self, senses: Senses, from_camera_m: Vector) -> tuple[Vector, float]:
+        """A point of the vehicle in the station frame, given from the camera in body axes; and `axis_yaw_rad`."""
+        x, y, z = from_camera_m
+        return station_point(self.belief, senses.motion, senses.yaw_rad, x, y, z)
 
 
 class RelativeFilter:
@@ -120,11 +127,11 @@ class RelativeFilter:
         """
         self._cfg = cfg
         self._restart_after = cfg.restart_after
-        self._dt_s = dt_s
         self._R_body_camera = np.ascontiguousarray(T_body_camera[:3, :3])
         self._floor = np.array([cfg.position_floor_m**2] * 3 + [cfg.rotation_floor_rad**2] * 3)
         walk, turn = cfg.position_walk_m_rs**2 * dt_s, cfg.heading_walk_rad_rs**2 * dt_s
-        self._law = RelativeLaw(
+        law = RelativeLaw(
+            dt_s=dt_s,
             R_body_camera=self._R_body_camera,
             camera_m=T_body_camera[:3, 3],
             target_m=np.array(target_m),
@@ -137,7 +144,9 @@ class RelativeFilter:
             target_spread_m=cfg.entrance_spread_m,
             bearing_gate=cfg.bearing_gate,
             min_bearing_range_m=cfg.min_bearing_range_m,
-        ).packed()
+        )
+        self._dt_s = dt_s
+        self._law, self._law_at_once = law.packed(), replace(law, dt_s=0.0).packed()
 
     def advance(
         self, state: RelativeState, senses: Senses, pose: PoseEstimate | None = None, ray_camera: Array | None = None
@@ -164,9 +173,10 @@ class RelativeFilter:
     ) -> RelativeState:
         T, cov = (pose.T_station_camera, pose.covariance) if pose is not None else (_NO_POSE, _NO_NOISE)
         impatient = state.refused + 1 >= self._restart_after
-        belief = state.belief.copy()
+        law = self._law if dt_s > 0.0 else self._law_at_once
+        belief: Records[RelativeBelief] = new_rows(1, _BELIEF)
         ray = ray_camera if ray_camera is not None else _NO_RAY
-        of_pose, of_bearing = advance(belief, senses.motion, senses.yaw_rad, dt_s, self._law, T, cov, impatient, ray)
+        of_pose, of_bearing = advance(belief, state.belief, senses.motion, senses.yaw_rad, law, T, cov, impatient, ray)
         if dt_s == 0.0 and of_pose == LEFT_OUT and of_bearing != ACCEPTED:
             return state
         since_fix_s, fixes, refused = state.since_fix_s + dt_s, state.fixes, state.refused

@@ -14,9 +14,9 @@ from auvdock.numeric.compiled import compiled
 from auvdock.numeric.motion import Motion
 from auvdock.numeric.records import Record, Records
 from auvdock.numeric.rotations import headed, sine_axis
-from auvdock.numeric.scalars import cross, within_pi
+from auvdock.numeric.scalars import Vector, cross, within_pi
 
-__all__ = ["ACCEPTED", "LEFT_OUT", "REFUSED", "RelativeBelief", "RelativeLaw", "Verdicts", "advance"]
+__all__ = ["ACCEPTED", "LEFT_OUT", "REFUSED", "RelativeBelief", "RelativeLaw", "advance", "station_point"]
 
 LEFT_OUT, ACCEPTED, REFUSED = 0, 1, 2
 """Verdicts on a measurement: none came or it is not usable; fused; an outlier."""
@@ -41,6 +41,8 @@ class RelativeBelief(Record):
 class RelativeLaw(Record):
     """What the filter goes by: the camera's mounting, and noise and limits (`relative_state.FilterCfg`)."""
 
+    dt_s: float
+    """Period over which is reckoned; 0 leaves the dead reckoning out."""
     R_body_camera: Annotated[Array, 3, 3]
     camera_m: Annotated[Array, 3]
     """Camera on the body."""
@@ -66,13 +68,6 @@ class RelativeLaw(Record):
     """Least distance of the light ahead of the camera."""
 
 
-class Verdicts(NamedTuple):
-    """What became of a period's measurements: `LEFT_OUT`, `ACCEPTED` or `REFUSED`."""
-
-    pose: int
-    bearing: int
-
-
 class _Correction(NamedTuple):
     """What a pose does to the belief: its squared Mahalanobis distance, shift (4,) of x, covariance (4, 4) after it."""
 
@@ -83,45 +78,62 @@ class _Correction(NamedTuple):
 
 @compiled
 def advance(
-    belief: Records[RelativeBelief],
+    after: Records[RelativeBelief],
+    before: Records[RelativeBelief],
     motion: Records[Motion],
     yaw_rad: float,
-    dt_s: float,
     law: Records[RelativeLaw],
     pose: Array,
     noise: Array,
     impatient: bool,
     ray: Array,
-) -> Verdicts:
+) -> tuple[int, int]:
     """One period: dead reckoning, then a pose, then a bearing, as far as they came.
 
     Args:
-        belief: (1,) brought up to date in place.
+        after: (1,) takes the next belief.
+        before: (1,) the last one.
         motion: (1,) `Senses.motion`.
         yaw_rad: compass heading.
-        dt_s: period; 0 to leave the dead reckoning out.
         law: (1,).
         pose: (4, 4) T_station_camera; NaN for none.
         noise: (6, 6) its covariance.
         impatient: leave the bearing out if the pose is refused, as the filter then starts anew.
         ray: (3,) unit direction to the light in the camera frame; 0 for none.
+
+    Returns:
+        What became of the pose and of the bearing: `LEFT_OUT`, `ACCEPTED` or `REFUSED`.
     """
+    after[0] = before[0]
     ground, rate, R_level_body = motion[0].ground_m_s, motion[0].rate_rad_s, motion[0].R_level_body
-    now, by = belief[0], law[0]
-    if dt_s > 0.0:
-        _reckon(now, ground, rate, headed(yaw_rad - now.axis_yaw_rad, R_level_body), dt_s, by)
+    now, by = after[0], law[0]
+    if by.dt_s > 0.0:
+        _reckon(now, ground, rate, headed(yaw_rad - now.axis_yaw_rad, R_level_body), by)
     of_pose = _fuse_pose(now, yaw_rad, R_level_body, pose, noise, by)
     if impatient and of_pose == REFUSED:
-        return Verdicts(of_pose, LEFT_OUT)
-    return Verdicts(of_pose, _fuse_bearing(now, yaw_rad, R_level_body, ray, by))
+        return of_pose, LEFT_OUT
+    return of_pose, _fuse_bearing(now, yaw_rad, R_level_body, ray, by)
 
 
 @compiled
-def _reckon(
-    now: RelativeBelief, ground_m_s: Array, rate_rad_s: Array, R_station_body: Array, dt_s: float, law: RelativeLaw
-) -> None:
+def station_point(
+    belief: Records[RelativeBelief], motion: Records[Motion], yaw_rad: float, x_m: float, y_m: float, z_m: float
+) -> tuple[Vector, float]:
+    """`RelativeState.station_point` of a point (x, y, z) from the camera in body axes, and ψ_s."""
+    now = belief[0]
+    R, camera = headed(yaw_rad - now.axis_yaw_rad, motion[0].R_level_body), now.camera_m
+    point_m = (
+        camera[0] + (R[0, 0] * x_m + R[0, 1] * y_m + R[0, 2] * z_m),
+        camera[1] + (R[1, 0] * x_m + R[1, 1] * y_m + R[1, 2] * z_m),
+        camera[2] + (R[2, 0] * x_m + R[2, 1] * y_m + R[2, 2] * z_m),
+    )
+    return point_m, now.axis_yaw_rad
+
+
+@compiled
+def _reckon(now: RelativeBelief, ground_m_s: Array, rate_rad_s: Array, R_station_body: Array, law: RelativeLaw) -> None:
     """ṗ = R_station_body (v + ω × r_camera), P ← F P Fᵀ + Q."""
-    lever = law.camera_m
+    lever, dt_s = law.camera_m, law.dt_s
     swing = cross(rate_rad_s[0], rate_rad_s[1], rate_rad_s[2], lever[0], lever[1], lever[2])
     ahead, port, up = ground_m_s[0] + swing[0], ground_m_s[1] + swing[1], ground_m_s[2] + swing[2]
     velocity = np.empty(3)

@@ -9,11 +9,13 @@ from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.motion import Motion
-from auvdock.numeric.records import Records
+from auvdock.numeric.records import Records, new_rows
 from auvdock.numeric.rotations import headed, rotation_of_euler_zyx
 from auvdock.numeric.scalars import Vector
 
 __all__ = ["Senses", "Vector", "cross", "read_senses"]
+
+_MOTION = Motion.dtype()
 
 
 class Senses(NamedTuple):
@@ -76,7 +78,7 @@ def read_senses(proprioception: Proprioception) -> Senses:
     depth, time = proprioception.depth_m, proprioception.time_s
     euler = proprioception.euler_zyx_rad
     yaw = float(euler[2])
-    motion = Motion.zeros()
+    motion: Records[Motion] = new_rows(1, _MOTION)
     _sense(
         motion,
         euler,

@@ -281,7 +281,7 @@ class RotatingPilot:
         beacon, flight, cfg = state.beacon, state.flight, self.cfg.rotating
         if flight.mode == ACQUIRE or beacon is None:
             return self._search(state, senses), state
-        current = flight.autopilot.current_m_s or (0.0, 0.0, 0.0)
+        current = flight.autopilot.current_m_s
         x, y = self._station_m(beacon)
         axis = beacon.axis_yaw_rad
         spread = min(1.0, beacon.range_sigma_m / max(beacon.range_m, 1.0))

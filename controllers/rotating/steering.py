@@ -8,9 +8,10 @@ from typing import Annotated
 
 from auvdock.controllers.autopilot import AutopilotSetpoint
 from auvdock.controllers.steering import Line, Steering, ground_course
+from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
 from auvdock.core.limits import NotNegative, Positive, at_least
-from auvdock.estimation.senses import Senses, Vector
+from auvdock.estimation.senses import Senses
 
 __all__ = ["CourseCfg", "LookAroundCfg", "look_around", "steer_course"]
 
@@ -110,7 +111,7 @@ def steer_course(
     speed_m_s: float,
     depth_m: float,
     senses: Senses,
-    current_m_s: Vector,
+    current_m_s: Array,
     reach_m_s: float,
     cfg: CourseCfg,
 ) -> Steering:

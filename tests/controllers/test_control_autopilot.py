@@ -100,5 +100,5 @@ def test_feed_forward_balances_the_water_at_a_steady_speed(velocity):
     rows = [0, 1, 2, 4, 5]
     np.testing.assert_allclose(wrench[rows], expected[rows], atol=1e-9)
     assert after.references_m_s == pytest.approx(velocity)
-    assert after.current_m_s == (0.0, 0.0, 0.0)
-    assert AUTOPILOT.initial_state().current_m_s is None
+    assert after.current_m_s.tolist() == [0.0, 0.0, 0.0]
+    assert AUTOPILOT.initial_state().current_m_s.tolist() == [0.0, 0.0, 0.0]

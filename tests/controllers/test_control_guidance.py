@@ -94,7 +94,10 @@ def course(place, integrals=(0.0, 0.0), hold=False, committed=False, turn=0.0, c
     """On an axis that leads east: surge, sway, heave, heading offset, integrals."""
     distance, port, up = place
     at = Place(distance, port, up, 0.0, turn, math.hypot(port, up))
-    return axis_course(LAW, at, integrals, hold, committed, CFG.lookahead_mid_m, turn, (*current, 0.0))
+    velocity, offset, after = axis_course(
+        LAW, at[:], integrals, hold, committed, CFG.lookahead_mid_m, turn, np.array([*current, 0.0])
+    )
+    return *velocity, offset, *after
 
 
 @settings(deadline=None)  # the first call may compile
