@@ -95,12 +95,12 @@ class SpotModel:
             ring_px2=self.ring_px2,
             per_log_px2=0.5 / math.log(radii[1] / radii[0]),
         ).packed()
-        self._law = SpreadLaw.read(self.law)
+        self._core_px2, self._face_px2_m2 = self.law["lens_px2"].item(), self.law["face_px2_m2"].item()
         self.samples = lens.camera.width_px * lens.camera.height_px * 3
 
     def sigma_px(self, range_m: Array) -> Array:
         """(n,) standard deviation of the core on the sensor."""
-        return np.sqrt(self._law.lens_px2 + self._law.face_px2_m2 / (range_m * range_m))
+        return np.sqrt(self._core_px2 + self._face_px2_m2 / (range_m * range_m))
 
     def spread(self, arrivals: Records[Arrival], shown: BoolArray) -> Spots:
         """Of the lights (n,) that arrive those that are shown (n,), as spots."""

@@ -16,6 +16,7 @@ from auvdock.core.arrays import Array, IntArray
 from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections
 from auvdock.core.limits import Count, Positive, at_least, between
+from auvdock.numeric.records import Records
 from auvdock.numeric.tracks import Track
 from auvdock.perception.track_filter import TrackLaw, advance, distances, settle
 from auvdock.perception.views import TrackViews
@@ -59,10 +60,6 @@ class LightTracker:
     method at cost d²/S + 2 ln(S/R), gated at d² / S ≤ gate².
 
     All arrays that it shows are views of two tables that the next frame goes on in.
-
-    Attributes:
-        table: (n,) all that is known of the tracks but their scores.
-        scores: (n, window) scores in the last frames in no particular order, 0 where there was no detection.
     """
 
     def __init__(self, cfg: TrackerCfg, rate_hz: float, width_px: int, height_px: int) -> None:
@@ -88,13 +85,23 @@ class LightTracker:
         """Forget all tracks."""
         self._table = Track.zeros(_ROOM)
         self._scores = np.zeros((_ROOM, self._cfg.window_frames))
-        self._show(0)
+        self._count = 0
         self._next_id = 0
         self._slot = 0
 
     def __len__(self) -> int:
         """Number of tracks alive."""
         return self._count
+
+    @property
+    def table(self) -> Records[Track]:
+        """(n,) all that is known of the tracks but their scores."""
+        return self._table[: self._count]
+
+    @property
+    def scores(self) -> Array:
+        """(n, window) scores in the last frames in no particular order, 0 where there was no detection."""
+        return self._scores[: self._count]
 
     @property
     def centre_px(self) -> Array:
@@ -143,8 +150,7 @@ class LightTracker:
         if count < 0:
             self._assign(distances(self.table, centre, score, class_id, law), score)
             count, next_id = settle(table, scores, before, centre, score, class_id, law, self._slot, self._next_id)
-        self._show(count)
-        self._next_id = next_id
+        self._count, self._next_id = count, next_id
 
     def mean_confidence(self) -> Array:
         """(n,) mean score of the detections within the window, 0 where there is none."""
@@ -159,11 +165,6 @@ class LightTracker:
         table, scores = Track.zeros(2 * least), np.zeros((2 * least, self._cfg.window_frames))
         table[: self._count], scores[: self._count] = self.table, self.scores
         self._table, self._scores = table, scores
-        self._show(self._count)
-
-    def _show(self, count: int) -> None:
-        """Let the tables be seen as far as there are tracks."""
-        self._count, self.table, self.scores = count, self._table[:count], self._scores[:count]
 
     def _assign(self, distance: Array, score: Array) -> None:
         """The Hungarian method, where several could be paired."""
