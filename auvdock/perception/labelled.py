@@ -57,18 +57,15 @@ def gather_lights(
     Returns:
         How many lights there are, and how many were seen.
     """
-    seen = carried = 0
+    seen = 0
     for i in range(len(tracks)):
-        if tracks[i].beacon_id >= 0:
-            carried += 1
-            if tracks[i].detection >= 0:
-                seen += 1
-    count = seen if seen >= _MIN_SEEN else carried
+        if tracks[i].beacon_id >= 0 and tracks[i].detection >= 0:
+            seen += 1
     row = 0
     for beacon in range(len(array_m)):
         for i in range(len(tracks)):
             track, j = tracks[i], tracks[i].detection
-            if track.beacon_id != beacon or (seen >= _MIN_SEEN and j < 0):
+            if track.beacon_id != beacon or (seen >= _MIN_SEEN and j < 0) or row == len(lights):
                 continue
             owners[row].track, owners[row].beacon = i, beacon
             light = lights[row]
@@ -85,4 +82,4 @@ def gather_lights(
                 if left <= 0.0 or top <= 0.0 or right >= size_px[0] - 1 or bottom >= size_px[1] - 1:
                     light.sigma_px += 0.5 * max(right - left, bottom - top)
             row += 1
-    return count, seen
+    return row, seen

@@ -181,11 +181,11 @@ class SpatiotemporalAssociation:
         return before is None or self._credibility.follows(solution, before, self._way_m, elapsed_s)
 
     def _likelier(self, solution: PnpSolution, lights: Records[Light], prior: Attitude) -> tuple[PnpSolution, bool]:
-        """The likelier of a pose and the other one of its plane, and whether it is so by far."""
+        """The likelier of a pose and the other one of its plane, and whether it is so by far and to be believed."""
         other = self._solver.mirrored(solution, lights, prior)
         if other is not None and other.cost < solution.cost:
             solution, other = other, solution
-        return solution, self._credibility.is_alone(solution, other)
+        return solution, self._credibility.is_alone(solution, other) and self._is_believed(solution)
 
     def _without_worst(self, lights: Records[Light], prior: Attitude) -> tuple[PnpSolution | None, int]:
         """Leave one of the seen lights out: a single stray light must not cost the identities of all."""
