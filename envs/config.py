@@ -13,6 +13,7 @@ from auvdock.core.errors import ConfigError, located
 from auvdock.core.limits import NotNegative, Positive, at_least, between
 from auvdock.core.rotating_beacon import BeaconClockCfg
 from auvdock.core.station import ConicalStationCfg, load_conical_station
+from auvdock.envs.latency import LatencyCfg
 from auvdock.envs.room import hull_room
 from auvdock.optics.imaging import ImagingCfg
 from auvdock.optics.nuisance import NuisanceCfg
@@ -92,6 +93,7 @@ class WorldCfg(Checked):
     limits: LimitsCfg = LimitsCfg()
     control_hz: float = 30.0
     """Commands a second."""
+    latency: LatencyCfg = LatencyCfg()
     station_heading: Literal["surveyed", "unknown"] = "surveyed"
     """"surveyed", or "unknown": each episode then draws a datum in ±180° that is added to every compass reading, and
     the station's heading by that compass must be perceived."""

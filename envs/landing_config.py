@@ -12,6 +12,7 @@ from auvdock.core.errors import ConfigError, located
 from auvdock.core.landing_station import LandingStationCfg, load_landing_station
 from auvdock.core.limits import NotNegative, at_least
 from auvdock.envs.config import Fidelity, LimitsCfg, check_rates
+from auvdock.envs.latency import LatencyCfg
 from auvdock.envs.room import hull_room
 from auvdock.optics.faults import FaultCfg
 from auvdock.optics.lamp import LampCfg
@@ -70,6 +71,7 @@ class LandingWorldCfg(Checked):
     limits: LimitsCfg = LimitsCfg()
     control_hz: float = 20.0
     """Commands a second; the paper's loop runs at 20 Hz, as its camera does. A multiple of the camera's rate."""
+    latency: LatencyCfg = LatencyCfg()
 
     def __post_init__(self) -> None:
         """Refuse rates that do not divide, and starts that have no place."""

@@ -22,6 +22,7 @@ from auvdock.core.strict import load_toml
 from auvdock.core.vehicle import MountCfg, VehicleCfg, load_vehicle
 from auvdock.envs.config import WorldCfg
 from auvdock.envs.landing_config import LandingWorldCfg
+from auvdock.envs.latency import CommandLink
 from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
 from auvdock.optics.imaging import UnderwaterCamera
 from auvdock.optics.water import load_water, with_attenuation
@@ -91,6 +92,7 @@ class VehicleWorld(ABC):
         self._limits, self._hold_s, self._control_s = cfg.limits, station.latch.hold_s, 1.0 / cfg.control_hz
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)
         self._steps_per_frame = round(cfg.sim.physics_hz / self.camera.rate_hz)
+        self._link = CommandLink(cfg.latency, len(vehicle.actuators), cfg.sim.physics_hz)
         self._step_count = 0
         self._last_frame_step = -1
         self._latched_at_s: float | None = None
@@ -151,6 +153,7 @@ class VehicleWorld(ABC):
             compass_datum_rad=drawn.compass_datum_rad,
         )
         self._camera_rng = camera
+        self._link.reset()
         self._reset_link(link)
         self._step_count = 0
         self._last_frame_step = -self._steps_per_frame
@@ -160,8 +163,10 @@ class VehicleWorld(ABC):
         self._seed, self._pictured = seed, False
 
     def step(self, values: Array) -> None:
-        """Apply actuator commands (n,) in [-1, 1] for one control period."""
-        self.simulator.step(values, self._steps_per_control)
+        """Give actuator commands (n,) in [-1, 1], which act after the latency, and fly on for one control period."""
+        for acting, steps in self._link.segments(values, self._steps_per_control):
+            self.simulator.step(acting, steps)
+        self._link.sensed()  # an observation of the state alone does without `sense`
         self._step_count += self._steps_per_control
         self._truth = None
         if self._latched_at_s is None and self.truth.latched:
@@ -169,6 +174,11 @@ class VehicleWorld(ABC):
 
     def sense(self) -> Sensed:
         """Sample the sensors now; once per control period."""
+        sensed = self._sense()
+        self._link.sensed()
+        return sensed
+
+    def _sense(self) -> Sensed:
         proprioception = self.simulator.proprioception()
         if self._step_count - self._last_frame_step < self._steps_per_frame:
             return Sensed(proprioception)
