@@ -62,6 +62,7 @@ an entry outside its limits (`terminal`), a hull that has been partly out of the
 (`surfaced`), or a vehicle `limits.carried_off_m` further from the station than at the start (`carried_off`). Truncated
 after `WorldCfg.limits.max_time_s`, 240 s. `info` always has `is_success` (bool) and `failure_reason` (str or None). A
 step after the end, or before the first reset, raises `gymnasium.error.ResetNeeded`.
+The last `info` of an episode has its metrics too, by the names of `EpisodeResult` (docs/metrics.md).
 
 ## Arguments
 `cfg` (`WorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"; by default the `cfg`'s,
@@ -91,7 +92,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.contracts import AzimuthFix, Percept, Sensed
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
 from auvdock.envs.config import StartCfg, WorldCfg
-from auvdock.envs.perceived import perceived_docking
+from auvdock.envs.perceived import docking_metrics, perceived_docking
 from auvdock.envs.vehicle_env import BOUND, VehicleEnv, box
 from auvdock.perception.pipeline import PerceptionCfg
 from auvdock.sim.truth import Truth
@@ -105,6 +106,7 @@ class DockingEnv(VehicleEnv[WorldCfg, StartCfg, PerceptionCfg]):
     default_cfg = staticmethod(WorldCfg)
     default_perception = staticmethod(PerceptionCfg)
     perceived = staticmethod(perceived_docking)
+    judged = staticmethod(docking_metrics)
     _fix: AzimuthFix | None = None
 
     def _forget(self) -> None:

@@ -66,6 +66,7 @@ closed after a touchdown that was too hard (`terminal`), a hull that has been pa
 `limits.surfaced_s` in all (`surfaced`), or a vehicle `limits.carried_off_m` further from the station than at the start
 (`carried_off`). Truncated after `LandingWorldCfg.limits.max_time_s`, 240 s. `info` always has `is_success` (bool) and
 `failure_reason` (str or None). A step after the end, or before the first reset, raises `gymnasium.error.ResetNeeded`.
+The last `info` of an episode has its metrics too, by the names of `EpisodeResult` (docs/metrics.md).
 
 ## Arguments
 `cfg` (`LandingWorldCfg`), `observation` ("state", "pose", "image"), `fidelity` ("pixels", "beacons"; by default the
@@ -93,7 +94,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.transforms import euler_zyx_from_rotation, invert
 from auvdock.envs.chase import from_the_side
 from auvdock.envs.landing_config import LandingStartCfg, LandingWorldCfg
-from auvdock.envs.perceived import perceived_landing
+from auvdock.envs.perceived import landing_metrics, perceived_landing
 from auvdock.envs.vehicle_env import VehicleEnv, box
 from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.perception.landing.config import LandingPerceptionCfg
@@ -110,6 +111,7 @@ class LandingEnv(VehicleEnv[LandingWorldCfg, LandingStartCfg, LandingPerceptionC
     default_cfg = staticmethod(LandingWorldCfg)
     default_perception = staticmethod(LandingPerceptionCfg)
     perceived = staticmethod(perceived_landing)
+    judged = staticmethod(landing_metrics)
     own_camera = "belly"
     chase_view = staticmethod(from_the_side)
     allocation_cfg = HoverAllocationCfg()

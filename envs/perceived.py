@@ -1,4 +1,4 @@
-"""Worlds together with what perceives them, made alike for environments and for episodes."""
+"""Worlds together with what perceives and what judges in them, made alike for environments and for episodes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ from auvdock.envs.landing_world import LandingWorld
 from auvdock.envs.world import DockingWorld
 from auvdock.estimation.landing.estimator import LandingEstimator
 from auvdock.estimation.perceiver import BeaconPerceiver, LandingPerceiver
+from auvdock.metrics.guidance import ConicalMetrics
+from auvdock.metrics.landing import LandingMetrics
+from auvdock.metrics.rotating import RotatingMetrics
+from auvdock.metrics.tick import Metrics
 from auvdock.perception.detectors import make_detector, make_station_detector
 from auvdock.perception.landing.config import LandingPerceptionCfg
 from auvdock.perception.landing.tag_detectors import make_tag_detector
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
 
-__all__ = ["perceived_docking", "perceived_landing"]
+__all__ = ["docking_metrics", "landing_metrics", "perceived_docking", "perceived_landing"]
 
 
 def perceived_docking(cfg: WorldCfg, perception: PerceptionCfg) -> tuple[DockingWorld, BeaconPerceiver]:
@@ -43,3 +47,16 @@ def perceived_landing(cfg: LandingWorldCfg, perception: LandingPerceptionCfg) ->
         tag_detector = make_tag_detector(perception.tag_detector, (cfg.station.tag.tag_id,))
     world = LandingWorld(cfg, perception.detector, perception.tag_detector)
     return world, LandingPerceiver(detector, tag_detector, LandingEstimator(perception, world.camera, cfg.station))
+
+
+def docking_metrics(world: DockingWorld) -> list[Metrics]:
+    """What judges an episode of docking into a funnel, and how a beacon led there where it has to be found first."""
+    cfg, camera, T_world_station = world.cfg, world.camera, world.simulator.T_world_station
+    metrics: list[Metrics] = [ConicalMetrics(camera, cfg.station, T_world_station)]
+    found_anywhere = cfg.station.rotating is not None or cfg.station_heading == "unknown"
+    return [*metrics, RotatingMetrics(camera, T_world_station, cfg.station.rotating)] if found_anywhere else metrics
+
+
+def landing_metrics(world: LandingWorld) -> list[Metrics]:
+    """What judges a landing."""
+    return [LandingMetrics(world.camera, world.simulator.vehicle, world.simulator.T_world_station)]

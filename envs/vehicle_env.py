@@ -14,13 +14,14 @@ from gymnasium.error import ResetNeeded
 from auvdock.controllers.allocation import AllocationCfg
 from auvdock.controllers.autopilot import AutopilotCfg
 from auvdock.core.arrays import Array, Image
-from auvdock.core.contracts import Proprioception, Sensed
+from auvdock.core.contracts import Command, Percept, Proprioception, Sensed
 from auvdock.envs.actions import checked_action
 from auvdock.envs.chase import ChaseCamera, View, from_behind
 from auvdock.envs.options import check_options, reward_settings, world_settings
 from auvdock.envs.reward import RewardCfg
 from auvdock.envs.vehicle_world import AnyWorldCfg, VehicleWorld
 from auvdock.estimation.perceiver import Perceiver
+from auvdock.metrics.tick import Metrics, Tick
 from auvdock.sim.simulator import Simulator
 from auvdock.sim.truth import Truth
 
@@ -46,6 +47,7 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC, Generic[W, S, P]):
         default_cfg: makes the world's settings (type W) where no `cfg` is given; their `start` is of the type S.
         default_perception: makes perception's settings (type P) where none are given.
         perceived: makes the world and what perceives it.
+        judged: makes what gathers an episode's metrics in that world.
         own_camera: `render_camera` of the pilot's camera.
         chase_view: where the chase camera stands.
         allocation_cfg: how the action wrappers share a wrench among the actuators, as the station's own pilot does.
@@ -61,6 +63,7 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC, Generic[W, S, P]):
     default_cfg: Callable[[], W]
     default_perception: Callable[[], P]
     perceived: Callable[[W, P], tuple[VehicleWorld, Perceiver]]
+    judged: Callable[[Any], list[Metrics]]
     own_camera = "bow"
     chase_view: Callable[[Simulator], View] = staticmethod(from_behind)
     allocation_cfg: ClassVar[AllocationCfg] = AllocationCfg()
@@ -99,6 +102,9 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC, Generic[W, S, P]):
         self._sensed: Sensed | None = None
         self._percept: Any = None
         """The newest frame's percept, of the kind that the station's perceiver gives; None before the first."""
+        self._newest: Percept | None = None
+        """The percept of this control period; None if it had no frame, or if perception does not look."""
+        self._metrics: list[Metrics] = []
         self._image: Image | None = None
         self._distance_m = 0.0
         self._energy_j = 0.0
@@ -125,11 +131,13 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC, Generic[W, S, P]):
     def _forget(self) -> None:
         """Start an episode without anything perceived."""
         self._perceiver.reset()
-        self._percept = None
+        self._percept = self._newest = None
+        self._metrics = self.judged(self._world)
 
     def _perceive(self, sensed: Sensed) -> None:
         """Let perception look at what was sensed."""
-        self._percept = self._perceiver.perceive(sensed) or self._percept
+        self._newest = self._perceiver.perceive(sensed)
+        self._percept = self._newest or self._percept
 
     @property
     def world(self) -> VehicleWorld:
@@ -172,7 +180,11 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC, Generic[W, S, P]):
         if self._halt is not None:
             raise ResetNeeded(f"the episode has {self._halt}: call env.reset() before the next step")
         world = self._world
-        world.step(checked_action(action, self._actuators))
+        values = checked_action(action, self._actuators)
+        tick = Tick(world.truth, self.proprioception, None, self._newest, Command(values))
+        for each in self._metrics:
+            each.add(tick)
+        world.step(values)
         self._sense()
         truth = world.truth
         end = world.end
@@ -181,7 +193,22 @@ class VehicleEnv(gymnasium.Env[Any, Any], ABC, Generic[W, S, P]):
         terminated = success or (end is not None and not truncated)
         if terminated or truncated:
             self._halt = f"ended ({'success' if success else end})"
-        return self._observe(truth), self._reward(truth, success, end), terminated, truncated, self._info(truth)
+        info = self._info(truth)
+        if self._halt is not None:
+            info |= self.episode_metrics()
+        return self._observe(truth), self._reward(truth, success, end), terminated, truncated, info
+
+    def episode_metrics(self) -> dict[str, Any]:
+        """The episode's metrics so far, named as in `auvdock.episode.result.EpisodeResult`; docs/metrics.md tells them.
+
+        The `info` of the step that ends an episode has them; where a wrapper ends it (`max_episode_steps`), ask here.
+        Those of perception need the observation "pose": nobody perceives otherwise.
+        """
+        truth = self._world.truth
+        found: dict[str, Any] = {"path_length_m": truth.path_length_m}
+        for each in self._metrics:
+            found |= each.fields(truth)
+        return found
 
     def render(self) -> Any:  # noqa: ANN401
         """An image (H, W, 3) uint8 from behind and above the vehicle, or what the pilot's camera sees."""

@@ -16,9 +16,9 @@ from auvdock.core.arrays import Image
 from auvdock.envs.chase import ChaseCamera, from_the_side
 from auvdock.episode.config import landing_level_cfg
 from auvdock.episode.runner import EpisodeRunner
-from auvdock.episode.trace import Tick
 from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.experiments.pictures import Album
+from auvdock.metrics.tick import Tick
 
 __all__ = ["main"]
 

@@ -19,12 +19,13 @@ from auvdock.campaign.statistics import Rate, wilson
 from auvdock.core.arrays import Array
 from auvdock.core.transforms import invert
 from auvdock.episode.config import LandingEpisodeCfg, landing_level_cfg
-from auvdock.episode.landing_metrics import ALIGNED_MODES, estimate_error
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
-from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.episode.trace import EpisodeSetup
 from auvdock.estimation.landing.estimator import LandingEstimator
 from auvdock.estimation.landing.percept import LandingPercept
+from auvdock.metrics.landing import ALIGNED_MODES, estimate_error
+from auvdock.metrics.tick import Tick
 from auvdock.perception.landing.config import LEVELS, LandingPerceptionCfg
 
 __all__ = ["PAPER", "LandingTrial", "LandingWatch", "TrialSummary", "fly_trials", "summarise", "trial_cfg"]

@@ -17,7 +17,8 @@ from auvdock.envs.chase import ChaseCamera
 from auvdock.episode.config import level_cfg
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
-from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.episode.trace import EpisodeSetup
+from auvdock.metrics.tick import Tick
 
 __all__ = ["Album", "main"]
 

@@ -25,8 +25,9 @@ from auvdock.core.strict import to_plain
 from auvdock.episode.config import EpisodeCfg, level_cfg
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
-from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.episode.trace import EpisodeSetup
 from auvdock.experiments.kept import Kept
+from auvdock.metrics.tick import Tick
 
 __all__ = [
     "ARMS",

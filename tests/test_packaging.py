@@ -17,6 +17,7 @@ ORDER = (
     "estimation",
     "planning",
     "controllers",
+    "metrics",
     "envs",
     "episode",
     "campaign",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, get_args, get_type_hints
@@ -17,6 +18,8 @@ Row = dict[str, Value]
 """Column name to value; None where the episode has none."""
 
 _KEPT_ELSEWHERE = {*EpisodeResult.WALL_CLOCK_FIELDS, "versions", "config", "seed"}
+_AS_JSON = "poses_by_solver"
+"""Column that holds a mapping, as JSON."""
 
 
 def _result_columns() -> dict[str, type]:
@@ -24,6 +27,9 @@ def _result_columns() -> dict[str, type]:
     kinds: dict[str, type] = {}
     for entry in fields(EpisodeResult):
         if entry.name not in _KEPT_ELSEWHERE:
+            if entry.name == _AS_JSON:
+                kinds[entry.name] = str
+                continue
             options = [option for option in get_args(hints[entry.name]) if option is not type(None)]
             kinds[entry.name] = options[0] if options else hints[entry.name]
     return kinds
@@ -42,6 +48,7 @@ def columns(cfg: CampaignCfg) -> dict[str, type]:
 def row_of(spec: EpisodeSpec, result: EpisodeResult) -> Row:
     """The row of a finished episode."""
     measured: Row = {name: getattr(result, name) for name in RESULT_COLUMNS}
+    measured[_AS_JSON] = json.dumps(result.poses_by_solver)
     return {"episode": spec.episode, "seed": spec.seed, **spec.point, **measured, "error": None}
 
 

@@ -12,7 +12,8 @@ from rich.text import Text
 from auvdock.cli.console import command_line, description, live, messages, output
 from auvdock.episode.result import EpisodeResult
 from auvdock.episode.stations import STATIONS, result_lines
-from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.episode.trace import EpisodeSetup
+from auvdock.metrics.tick import Tick
 
 __all__ = ["ProgressDisplay", "print_result"]
 

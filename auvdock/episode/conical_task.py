@@ -7,14 +7,9 @@ from functools import partial
 
 from auvdock.controllers.pilot import ConicalPilot
 from auvdock.controllers.rotating.pilot import RotatingPilot
-from auvdock.core.arrays import Array
-from auvdock.core.camera import Camera
-from auvdock.core.station import ConicalStationCfg
-from auvdock.envs.perceived import perceived_docking
+from auvdock.envs.perceived import docking_metrics, perceived_docking
 from auvdock.episode.config import EpisodeCfg
-from auvdock.episode.metrics import GuidanceMetrics
-from auvdock.episode.rotating_metrics import RotatingMetrics
-from auvdock.episode.task import Metrics, Task, make_pilot
+from auvdock.episode.task import Task, make_pilot
 
 __all__ = ["conical_task"]
 
@@ -31,7 +26,6 @@ def conical_task(cfg: EpisodeCfg) -> Task:
     world, perceiver = perceived_docking(cfg.world, cfg.perception)
     found_anywhere = station.rotating is not None or cfg.world.station_heading == "unknown"
     pilot = make_pilot(cfg, world, RotatingPilot if found_anywhere else ConicalPilot)
-    by_beacon = isinstance(pilot, RotatingPilot)
     return Task(
         kind="conical" if station.rotating is None else "rotating",
         station=station,
@@ -39,12 +33,6 @@ def conical_task(cfg: EpisodeCfg) -> Task:
         world=world,
         perceiver=perceiver,
         pilot=pilot,
-        metrics=partial(_metrics, world.camera, station, world.simulator.T_world_station, by_beacon),
+        metrics=partial(docking_metrics, world),
         stages=_STAGES,
     )
-
-
-def _metrics(camera: Camera, station: ConicalStationCfg, T_world_station: Array, by_beacon: bool) -> list[Metrics]:
-    """Precise guidance as paper A counts it, how the nose passed the throat, and how the rotating beacon led."""
-    metrics: list[Metrics] = [GuidanceMetrics(camera, station, T_world_station)]
-    return [*metrics, RotatingMetrics(camera, T_world_station, station.rotating)] if by_beacon else metrics

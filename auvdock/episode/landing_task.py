@@ -8,12 +8,8 @@ from typing import cast
 
 from auvdock.controllers.landing.pilot import LandingPilot
 from auvdock.controllers.named import PilotFactory
-from auvdock.core.arrays import Array
-from auvdock.core.camera import Camera
-from auvdock.core.vehicle import VehicleCfg
-from auvdock.envs.perceived import perceived_landing
+from auvdock.envs.perceived import landing_metrics, perceived_landing
 from auvdock.episode.config import LandingEpisodeCfg
-from auvdock.episode.landing_metrics import LandingMetrics
 from auvdock.episode.task import Task, make_pilot
 
 __all__ = ["landing_task"]
@@ -44,10 +40,6 @@ def landing_task(cfg: LandingEpisodeCfg) -> Task:
         world=world,
         perceiver=perceiver,
         pilot=make_pilot(cfg, world, own),
-        metrics=partial(_metrics, world.camera, world.simulator.vehicle, world.simulator.T_world_station),
+        metrics=partial(landing_metrics, world),
         stages=_STAGES,
     )
-
-
-def _metrics(camera: Camera, vehicle: VehicleCfg, T_world_station: Array) -> list[LandingMetrics]:
-    return [LandingMetrics(camera, vehicle, T_world_station)]

@@ -65,17 +65,23 @@ class EpisodeResult:
     failure_reason: str | None
     """One of `FAILURE_REASONS`, None on success."""
     distortion_rate: float | None
-    """invalid_frames / precise_frames (paper A, table 10); None if precise guidance was never entered."""
+    """invalid_frames / precise_frames (paper A, table 10): how often no pose was measured. None if precise guidance was
+    never entered."""
+    distortion_available: float | None
+    """unavailable_frames / precise_frames: how often there was neither a measured nor a predicted pose to steer by."""
     precise_frames: int
-    """Frames in precise guidance: from the first measured pose until the array leaves the camera's view near by; in
-    landing, until the latch closes."""
+    """Frames in precise guidance: from the entry until the array leaves the camera's view near by; in landing, until
+    the latch closes. The entry is the first measured pose that is right and that others follow (docs/metrics.md)."""
     invalid_frames: int
     """Those of them without a pose measured in that frame."""
+    unavailable_frames: int
+    """Those of them without any pose, measured or predicted."""
     entry_distance_m: float | None
-    """Distance from the mouth along the approach axis at the first measured pose (paper A, table 9); in landing, of
-    the seat from its place."""
+    """Distance of the nose from the mouth along the approach axis at the entry (paper A, table 9); in landing, of the
+    seat from its place."""
     precise_range_m: float | None
-    """From there to the last measured pose: total range of precise guidance (paper A, table 9)."""
+    """From there to the last right pose before the first go-around: total range of precise guidance (paper A, table
+    9)."""
     time_s: float
     path_length_m: float
     energy_j: float
@@ -94,15 +100,21 @@ class EpisodeResult:
     """Poses measured in this very frame, until the latch closes."""
     false_poses: int
     """Those of them whose camera position is off by more than 0.3 m and by more than 10 % of the range
-    (`auvdock.episode.false_poses`)."""
+    (`auvdock.metrics.false_poses`)."""
     false_pose_rate: float | None
     """false_poses / measured_poses; None if no pose was measured."""
+    poses_by_solver: Mapping[str, int]
+    """Measured poses by the name of what solved them; "tracked" is refined from the frame before."""
     attempts: int
     """Approaches begun; 1 means no go-around."""
     seed: int
     wall_s: float
-    """Wall-clock time; the only field, with real_time_factor, that differs between two runs of one seed."""
+    """Wall-clock time; `WALL_CLOCK_FIELDS` are the only ones that differ between two runs of one seed."""
     real_time_factor: float
+    frame_ms_median: float | None
+    """Wall-clock time that detector and perception took for a frame; None without frames."""
+    frame_ms_p95: float | None
+    """95th percentile of it."""
     versions: Mapping[str, str]
     """auvdock, mujoco, numpy, opencv and Python versions."""
     config: Mapping[str, Any]
@@ -128,7 +140,7 @@ class EpisodeResult:
     final_position_error_m: float | None = None
     """Horizontal distance of the seat from its place as the latch closed, or at the end of the last descent."""
     max_position_error_m: float | None = None
-    """The greatest such distance after alignment (`auvdock.episode.landing_metrics`)."""
+    """The greatest such distance after alignment (`auvdock.metrics.landing`)."""
     final_heading_error_rad: float | None = None
     """Magnitude of the heading error ψ at the same moment as the final position error."""
     max_heading_error_rad: float | None = None
@@ -152,7 +164,7 @@ class EpisodeResult:
     blind_share: float | None = None
     """On neither."""
 
-    WALL_CLOCK_FIELDS = ("wall_s", "real_time_factor")
+    WALL_CLOCK_FIELDS = ("wall_s", "real_time_factor", "frame_ms_median", "frame_ms_p95")
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for `json.dumps`."""

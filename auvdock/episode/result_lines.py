@@ -39,17 +39,20 @@ def shared_lines(result: EpisodeResult) -> list[Line]:
         Line("approaches", result.attempts, "{:d}"),
         Line("measured poses", result.measured_poses, "{:d}"),
         Line("false poses", _percent(result.false_pose_rate), "{:.2f} %"),
+        Line("perception per frame, median", result.frame_ms_median, "{:.2f} ms"),
+        Line("perception per frame, 95 %", result.frame_ms_p95, "{:.2f} ms"),
     ]
 
 
 def docking_lines(result: EpisodeResult) -> list[Line]:
     """What docking into a funnel has, and what a rotating beacon adds where the pilot went by one."""
     lines = [
-        Line("entry distance (first pose)", result.entry_distance_m, "{:.1f} m"),
+        Line("entry distance", result.entry_distance_m, "{:.1f} m"),
         Line("precise-guidance range", result.precise_range_m, "{:.1f} m"),
         Line("precise frames", result.precise_frames, "{:d}"),
         Line("invalid frames", result.invalid_frames, "{:d}"),
         Line("distortion rate", _percent(result.distortion_rate), "{:.2f} %"),
+        Line("without even a predicted pose", _percent(result.distortion_available), "{:.2f} %"),
         Line("median pose error", result.pose_error_median_m, "{:.3f} m"),
         Line("lateral error at entry", result.lateral_error_m, "{:+.3f} m"),
         Line("vertical error at entry", result.vertical_error_m, "{:+.3f} m"),
@@ -72,7 +75,7 @@ def docking_lines(result: EpisodeResult) -> list[Line]:
 def landing_lines(result: EpisodeResult) -> list[Line]:
     """What a landing has."""
     return [
-        Line("range of the first pose", result.entry_distance_m, "{:.1f} m"),
+        Line("entry distance", result.entry_distance_m, "{:.1f} m"),
         Line("frames by lights alone", _percent(result.lights_share), "{:.1f} %"),
         Line("frames by the tag alone", _percent(result.tag_share), "{:.1f} %"),
         Line("frames by both", _percent(result.fused_share), "{:.1f} %"),

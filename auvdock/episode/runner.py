@@ -14,8 +14,8 @@ from auvdock.core.strict import to_plain
 from auvdock.episode.config import AnyEpisodeCfg
 from auvdock.episode.result import EpisodeResult, stage_of
 from auvdock.episode.stations import STATIONS, make_task
-from auvdock.episode.task import Metrics
-from auvdock.episode.trace import EpisodeObserver, EpisodeSetup, Tick
+from auvdock.episode.trace import EpisodeObserver, EpisodeSetup
+from auvdock.metrics.tick import Metrics, Tick
 from auvdock.sim.mj import mujoco
 
 __all__ = ["EpisodeRunner", "software_versions"]
@@ -85,7 +85,10 @@ class EpisodeRunner:
         state = self.pilot.initial_state()
         while True:
             sensed = world.sense()
+            began = time.perf_counter()
             percept = self.perceiver.perceive(sensed)
+            if percept is not None:
+                flight.frames_s.append(time.perf_counter() - began)
             command, state = self.pilot.step(state, percept, sensed.proprioception)
             flight.count(command.mode)
             image = sensed.frame.image if sensed.frame is not None else None
@@ -135,6 +138,8 @@ class EpisodeRunner:
             seed=seed,
             wall_s=wall_s,
             real_time_factor=truth.time_s / wall_s if wall_s > 0.0 else 0.0,
+            frame_ms_median=flight.frame_ms(50.0),
+            frame_ms_p95=flight.frame_ms(95.0),
             versions=self._versions,
             config=self._plain_config,
             **measured,
@@ -149,6 +154,12 @@ class _Flight:
         self.stage = ""
         self.attempts = 1
         self.failure_reason: str | None = None
+        self.frames_s: list[float] = []
+        """Wall-clock time that perception took for each frame."""
+
+    def frame_ms(self, percent: float) -> float | None:
+        """Percentile of the time that a frame took."""
+        return 1e3 * float(np.percentile(self.frames_s, percent)) if self.frames_s else None
 
     def count(self, mode: str) -> None:
         """Note the pilot's mode; `stage` is the last one that was not a retreat."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from auvdock.controllers.named import PilotFactory, make_named_pilot
 from auvdock.controllers.pilot import Pilot
@@ -12,23 +12,10 @@ from auvdock.core.errors import located
 from auvdock.core.stations import StationCfg
 from auvdock.envs.vehicle_world import VehicleWorld
 from auvdock.episode.config import AnyEpisodeCfg
-from auvdock.episode.trace import Tick
 from auvdock.estimation.perceiver import Perceiver
-from auvdock.sim.truth import Truth
+from auvdock.metrics.tick import Metrics
 
-__all__ = ["Metrics", "Task", "make_pilot"]
-
-
-class Metrics(Protocol):
-    """Gathers some of an episode's metrics tick by tick."""
-
-    def add(self, tick: Tick) -> None:
-        """Take in one control period."""
-        ...
-
-    def fields(self, truth: Truth) -> Mapping[str, Any]:
-        """The fields of `EpisodeResult` that it fills, at the episode's end; what nobody fills keeps None."""
-        ...
+__all__ = ["Task", "make_pilot"]
 
 
 @dataclass(frozen=True, eq=False)

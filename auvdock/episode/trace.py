@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from auvdock.core.arrays import Array, Image
+from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
-from auvdock.core.contracts import Command, Percept, Proprioception
 from auvdock.core.stations import StationCfg
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.episode.result import EpisodeResult
-from auvdock.sim.truth import Truth
+from auvdock.metrics.tick import Tick
 
-__all__ = ["EpisodeObserver", "EpisodeSetup", "Tick"]
+__all__ = ["EpisodeObserver", "EpisodeSetup"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,25 +38,6 @@ class EpisodeSetup:
     T_world_station: Array
     detector: str
     water: str
-
-
-@dataclass(frozen=True, eq=False)
-class Tick:
-    """One control period.
-
-    Attributes:
-        truth: the simulator's state; for the log only, the pilot never sees it.
-        proprioception: what the vehicle's own sensors said.
-        image: (H, W, 3) uint8 RGB if a frame was rendered in this period, else None.
-        percept: what perception made of this period's frame, None if there was no frame.
-        command: what the pilot gave.
-    """
-
-    truth: Truth
-    proprioception: Proprioception
-    image: Image | None
-    percept: Percept | None
-    command: Command
 
 
 class EpisodeObserver(Protocol):

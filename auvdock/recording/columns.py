@@ -18,7 +18,8 @@ from auvdock.recording.pose_error import camera_in_station, pose_errors
 
 if TYPE_CHECKING:
     from auvdock.core.contracts import Percept, PoseEstimate
-    from auvdock.episode.trace import EpisodeSetup, Tick
+    from auvdock.episode.trace import EpisodeSetup
+    from auvdock.metrics.tick import Tick
     from auvdock.recording.part import StationPart
 
 __all__ = ["ColumnWriter", "Row"]

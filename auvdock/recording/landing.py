@@ -20,7 +20,8 @@ from auvdock.recording.palette import rgba
 from auvdock.recording.part import Point, Series, StationPart, plot
 
 if TYPE_CHECKING:
-    from auvdock.episode.trace import EpisodeSetup, Tick
+    from auvdock.episode.trace import EpisodeSetup
+    from auvdock.metrics.tick import Tick
 
 __all__ = ["LandingPart"]
 

@@ -13,7 +13,7 @@ from auvdock.core.arrays import Array
 from auvdock.recording.batch import Batch
 
 if TYPE_CHECKING:
-    from auvdock.episode.trace import Tick
+    from auvdock.metrics.tick import Tick
 
 __all__ = ["Point", "Series", "StationPart", "plot"]
 

@@ -24,7 +24,8 @@ from auvdock.recording.summary import result_document, unfinished_document
 
 if TYPE_CHECKING:
     from auvdock.episode.result import EpisodeResult
-    from auvdock.episode.trace import EpisodeSetup, Tick
+    from auvdock.episode.trace import EpisodeSetup
+    from auvdock.metrics.tick import Tick
 
 __all__ = ["RecordingWarning", "RerunRecorder", "check_writable"]
 

@@ -20,7 +20,8 @@ from auvdock.recording.palette import rgba, wavelength_rgb
 from auvdock.recording.part import plot
 
 if TYPE_CHECKING:
-    from auvdock.episode.trace import EpisodeSetup, Tick
+    from auvdock.episode.trace import EpisodeSetup
+    from auvdock.metrics.tick import Tick
 
 __all__ = ["RotatingPart"]
 

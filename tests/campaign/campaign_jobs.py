@@ -1,5 +1,6 @@
 """Synthetic episodes; a module of its own so that spawned workers can import it."""
 
+import json
 import os
 import signal
 import time
@@ -16,6 +17,7 @@ def row(spec, success, reason="near"):
     """A row with plausible figures that follow from the episode's seed."""
     part = spec.seed / 2**53
     drawn = {name: kind(part * 100) for name, kind in RESULT_COLUMNS.items() if kind in (int, float)}
+    drawn["poses_by_solver"] = json.dumps({"sqpnp": int(part * 100)})
     outcome = {"success": success, "failure_reason": None if success else reason}
     ordered = {name: outcome[name] if name in outcome else drawn[name] for name in RESULT_COLUMNS}
     return {"episode": spec.episode, "seed": spec.seed, **spec.point, **ordered, "error": None}

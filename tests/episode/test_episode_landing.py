@@ -20,11 +20,11 @@ from auvdock.core.transforms import invert, make_transform, rotation_from_euler_
 from auvdock.envs.landing_config import LandingWorldCfg
 from auvdock.envs.landing_world import LandingWorld
 from auvdock.episode.config import LEVELS, LandingEpisodeCfg, landing_level_cfg
-from auvdock.episode.landing_metrics import LandingMetrics, estimate_error
 from auvdock.episode.result import FAILURE_REASONS, EpisodeResult
 from auvdock.episode.runner import EpisodeRunner
-from auvdock.episode.trace import Tick
 from auvdock.estimation.landing.percept import LandingPercept
+from auvdock.metrics.landing import LandingMetrics, estimate_error
+from auvdock.metrics.tick import Tick
 from auvdock.recording import paths
 from auvdock.recording.rerun_recorder import RerunRecorder
 
@@ -158,7 +158,7 @@ def test_nothing_seen_leaves_nothing_but_counts() -> None:
 
 def test_only_the_last_descent_counts_as_after_alignment() -> None:
     gathered = metrics()
-    gathered.add(tick("align", (0.5, 0.0, 2.0), shifted(0.3)))
+    gathered.add(tick("align", (0.5, 0.0, 2.0), shifted(0.2)))
     gathered.add(tick("descend", (0.2, 0.0, 1.0), shifted(0.1)))
     gathered.add(tick("abort", (0.4, 0.0, 1.5), shifted(0.1)))
     gathered.add(tick("descend", (0.0, 0.03, 1.0), shifted(0.015)))
@@ -176,12 +176,14 @@ def test_only_the_last_descent_counts_as_after_alignment() -> None:
 
 def test_held_poses_count_as_blind_and_are_judged_all_the_same() -> None:
     gathered = metrics()
-    gathered.add(tick("descend", (0.0, 0.0, 1.0), shifted()))
+    for _ in range(3):
+        gathered.add(tick("descend", (0.0, 0.0, 1.0), shifted()))
     gathered.add(tick("descend", (0.0, 0.0, 0.9), shifted(0.05), "none", measured=False))
     fields = gathered.fields(WORLD.simulator.truth)
-    assert fields["blind_share"] == fields["distortion_rate"] == pytest.approx(0.5)
-    assert fields["aligned_frames"] == 2
-    assert fields["estimate_within_20mm_3deg"] == pytest.approx(0.5)
+    assert fields["blind_share"] == fields["distortion_rate"] == pytest.approx(0.25)
+    assert fields["distortion_available"] == 0.0
+    assert fields["aligned_frames"] == 4
+    assert fields["estimate_within_20mm_3deg"] == pytest.approx(0.75)
 
 
 def test_estimate_error_is_the_seats() -> None:

@@ -15,7 +15,8 @@ from auvdock.core.station import load_conical_station
 from auvdock.core.transforms import invert, make_transform, rotation_from_euler_zyx
 from auvdock.core.vehicle import load_vehicle
 from auvdock.episode.result import EpisodeResult
-from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.episode.trace import EpisodeSetup
+from auvdock.metrics.tick import Tick
 from auvdock.sim.truth import Truth
 
 POSE_OFFSET_STATION_M = np.array([-0.30, 0.10, 0.05])
@@ -102,8 +103,10 @@ def make_result(*, success: bool = True) -> EpisodeResult:
         success=success,
         failure_reason=None if success else "timeout",
         distortion_rate=0.0413,
+        distortion_available=0.0124,
         precise_frames=242,
         invalid_frames=10,
+        unavailable_frames=3,
         entry_distance_m=17.25,
         precise_range_m=15.5,
         time_s=60.0,
@@ -118,10 +121,13 @@ def make_result(*, success: bool = True) -> EpisodeResult:
         measured_poses=232,
         false_poses=3,
         false_pose_rate=3 / 232,
+        poses_by_solver={"sqpnp": 2, "tracked": 230},
         attempts=1,
         seed=7,
         wall_s=1.0,
         real_time_factor=60.0,
+        frame_ms_median=0.4,
+        frame_ms_p95=1.1,
         versions={"auvdock": "0.1.0"},
         config={},
     )

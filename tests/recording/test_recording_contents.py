@@ -14,7 +14,8 @@ from synthetic_episode import MODES, POSE_OFFSET_STATION_M, YAW_ERROR_DEG, make_
 
 from auvdock.core.contracts import RED, Bearing
 from auvdock.core.station import ConicalStationCfg
-from auvdock.episode.trace import EpisodeSetup, Tick
+from auvdock.episode.trace import EpisodeSetup
+from auvdock.metrics.tick import Tick
 from auvdock.recording import paths
 from auvdock.recording.rerun_recorder import RerunRecorder
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
-from auvdock.core.contracts import Percept
 from auvdock.core.transforms import invert
 from auvdock.core.vehicle import VehicleCfg
-from auvdock.episode.false_poses import FalsePoses
-from auvdock.episode.trace import Tick
 from auvdock.estimation.landing.percept import LandingPercept
+from auvdock.metrics.guidance import GuidanceMetrics
+from auvdock.metrics.tick import Tick
 from auvdock.sim.truth import Truth
 
 __all__ = ["ALIGNED_MODES", "LandingMetrics", "estimate_error"]
@@ -28,32 +27,28 @@ _PAPER_M, _PAPER_RAD = 0.020, math.radians(3.0)
 _TARGET_M, _TARGET_RAD = 0.010, math.radians(1.0)
 
 
-class LandingMetrics:
+class LandingMetrics(GuidanceMetrics):
     """Errors ξ, η, ζ, ψ between vehicle and station, and those of the estimate, after alignment.
 
     "After alignment" is the last unbroken stretch of `ALIGNED_MODES` before the latch closed or the episode ended: a
     retreat begins it anew. In it the vehicle's errors are the true ones of its seat (`LandingTruth`); the estimate's
-    are those of the filtered pose less the truth, of all frames with a pose, measured or held.
+    are those of the filtered pose less the truth, of all frames with a pose, measured or held. Every frame from the
+    entry on counts as precise guidance, by what it rested on.
     """
 
     def __init__(self, camera: Camera, vehicle: VehicleCfg, T_world_station: Array) -> None:
         """Start empty."""
-        self._T_body_camera = camera.T_body_camera
+        super().__init__(camera, T_world_station)
         self._T_camera_body = invert(camera.T_body_camera)
         self._seat_body = np.append(vehicle.seat_body_m, 1.0)
-        self._T_station_world = invert(T_world_station)
-        self._levels: Counter[str] = Counter()
-        self._entry_m: float | None = None
-        self._last_m: float | None = None
-        self._pose_errors_m: list[float] = []
-        self._camera_errors_m: list[float] = []
-        self._camera_ranges_m: list[float] = []
+        self._levels: list[str] = []
         self._aligned = False
         self._flown: list[tuple[float, float]] = []
         self._estimated: list[tuple[float, float]] = []
 
     def add(self, tick: Tick) -> None:
         """Take in one control period."""
+        super().add(tick)
         truth, percept = tick.truth, tick.percept
         landing = truth.landing
         if landing is None:
@@ -67,29 +62,29 @@ class LandingMetrics:
         if counts:
             along, across, _ = landing.seat_error_m.tolist()
             self._flown.append((math.hypot(along, across), abs(landing.heading_error_rad)))
-        if percept is not None:
-            self._add_percept(truth, percept, counts)
+        if percept is None or truth.latched:
+            return
+        pose = percept.pose
+        measured = pose is not None and pose.measured
+        self._levels.append(percept.level if isinstance(percept, LandingPercept) and measured else "none")
+        if pose is not None and counts:
+            true = self._T_station_world @ truth.T_world_body
+            error = estimate_error(pose.T_station_camera @ self._T_camera_body, true, self._seat_body)
+            self._estimated.append((float(np.abs(error[:3]).max()), abs(float(error[3]))))
 
     def fields(self, truth: Truth) -> Mapping[str, Any]:
         """Guidance, alignment and touchdown, named as in `EpisodeResult`."""
-        landing = truth.landing
-        frames = self._levels.total()
+        landing, entry = truth.landing, self.entry
+        levels = Counter(self._levels[entry:]) if entry is not None else Counter[str]()
+        frames = levels.total()
         shares = {
-            f"{name}_share": self._levels[level] / frames if frames else None
+            f"{name}_share": levels[level] / frames if frames else None
             for name, level in (("lights", "lights"), ("tag", "tag"), ("fused", "fused"), ("blind", "none"))
         }
         flown = np.array(self._flown).reshape(-1, 2)
         guess = np.array(self._estimated).reshape(-1, 2)
-        invalid = self._levels["none"]
-        entry_m, last_m = self._entry_m, self._last_m
         return {
-            "distortion_rate": invalid / frames if frames else None,
-            "precise_frames": frames,
-            "invalid_frames": invalid,
-            "entry_distance_m": entry_m,
-            "precise_range_m": None if entry_m is None or last_m is None else entry_m - last_m,
-            "pose_error_median_m": float(np.median(self._pose_errors_m)) if self._pose_errors_m else None,
-            **vars(FalsePoses.count(self._camera_errors_m, self._camera_ranges_m)),
+            **super().fields(truth),
             "touchdown_speed_m_s": None if landing is None else landing.touchdown_speed_m_s,
             "touchdown_force_n": None if landing is None else landing.touchdown_force_n,
             "final_position_error_m": float(flown[-1, 0]) if len(flown) else None,
@@ -103,32 +98,6 @@ class LandingMetrics:
             "estimate_within_10mm_1deg": _share_within(guess, _TARGET_M, _TARGET_RAD),
             **shares,
         }
-
-    def _add_percept(self, truth: Truth, percept: Percept, counts: bool) -> None:
-        level = percept.level if isinstance(percept, LandingPercept) else "none"
-        measured = percept.pose is not None and percept.pose.measured
-        if self._entry_m is None and not measured:
-            return
-        if truth.latched:
-            return
-        self._levels[level if measured else "none"] += 1
-        if percept.pose is None:
-            return
-        error = estimate_error(
-            percept.pose.T_station_camera @ self._T_camera_body,
-            self._T_station_world @ truth.T_world_body,
-            self._seat_body,
-        )
-        if measured:
-            self._entry_m = truth.range_m if self._entry_m is None else self._entry_m
-            self._last_m = truth.range_m
-            self._pose_errors_m.append(float(np.linalg.norm(error[:3])))
-            camera_m = (self._T_station_world @ truth.T_world_body @ self._T_body_camera)[:3, 3]
-            error_m = np.linalg.norm(percept.pose.T_station_camera[:3, 3] - camera_m)
-            self._camera_errors_m.append(float(error_m))
-            self._camera_ranges_m.append(float(np.linalg.norm(camera_m)))
-        if counts:
-            self._estimated.append((float(np.abs(error[:3]).max()), abs(float(error[3]))))
 
 
 def estimate_error(T_station_body: Array, T_true: Array, seat_body: Array) -> Array:

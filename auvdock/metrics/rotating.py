@@ -14,7 +14,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.camera import Camera
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.transforms import invert
-from auvdock.episode.trace import Tick
+from auvdock.metrics.tick import Tick
 from auvdock.sim.truth import Truth
 
 __all__ = ["RotatingMetrics"]
@@ -36,7 +36,7 @@ class RotatingMetrics:
             T_world_station: (4, 4).
             beacon: azimuths are about it; about the mouth where there is none.
         """
-        self._body_camera = camera.T_body_camera[:, 3]
+        self._body_camera = camera.T_body_camera[:, 3].copy()
         self._T_station_world = invert(T_world_station)
         x, y, _ = beacon.position_m if beacon is not None else (0.0, 0.0, 0.0)
         self._beacon_xy_m = (x, y)
