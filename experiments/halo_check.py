@@ -13,7 +13,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.optics.halo import halo_table
 from auvdock.optics.photons.making import left_after, ring_radiance
 from auvdock.optics.photons.phase import load_phase
-from auvdock.optics.photons.table import load_halo, phase_of
+from auvdock.optics.photons.table import load_halo, photon_halo_of
 from auvdock.optics.photons.walk import Tally, shoot
 from auvdock.optics.water import WaterCfg
 
@@ -150,10 +150,10 @@ def halo_case(water: WaterCfg, range_m: float, wavelength_nm: float) -> HaloCase
     a, b = water.absorption_at(wavelength_nm), water.scattering_at(wavelength_nm)
     if b <= 0.0:
         raise ConfigError("attenuation", a + b, "more than the water's absorption: what does not scatter has no halo")
-    phase, angle, left = phase_of(water), np.radians(HALF_ANGLES_DEG), math.exp(-a * range_m)
-    halo = load_halo(phase)
+    angle, left = np.radians(HALF_ANGLES_DEG), math.exp(-a * range_m)
+    halo = photon_halo_of(water)
     return HaloCase(
-        phase=phase,
+        phase=halo.phase,
         absorption_per_m=a,
         scattering_per_m=b,
         scattering_depth=b * range_m,

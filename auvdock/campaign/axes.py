@@ -39,6 +39,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "gust": ("world.sim.current.gust_std_m_s",),
     "shear": ("world.sim.current.shear_per_m",),
     "attenuation": ("world.attenuation_per_m",),
+    "turbidity": ("world.turbidity_per_m",),
     "water": ("world.water",),
     "flicker": ("world.nuisance.flicker",),
     "marine_snow": ("world.nuisance.marine_snow",),
