@@ -20,6 +20,7 @@ from auvdock.episode.config import AnyEpisodeCfg
 __all__ = [
     "ALIASES",
     "KIND_WORDS",
+    "TURBIDITY_AXES",
     "WATER_AXES",
     "AxisCfg",
     "AxisValue",
@@ -59,6 +60,9 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
 
 WATER_AXES = ("water", "world.water")
 """Names of the axis that varies the water, whose values may be files."""
+
+TURBIDITY_AXES = ("turbidity", "world.turbidity_per_m")
+"""Names of the axis along Petzold's waters, each of which is a water of its own."""
 
 Distribution = Literal["uniform", "log_uniform", "normal"]
 """`normal` has 95 % of its mass between low and high and is cut off there."""

@@ -34,8 +34,8 @@ class DockFlags(ABC):
     controller: str | None = None
     """A pilot of your own as package.module:Name, in place of the station's."""
     water: str | None = None
-    """Water preset (I, IA, IB, II, III, 1C to 9C, petzold_clear, petzold_coastal, petzold_harbour, clear, pool, lake), or
-    a TOML file written as assets/waters are."""
+    """Water preset (I, IA, IB, II, III, 1C to 9C, petzold_clear, petzold_coastal, petzold_harbour, clear, pool, lake),
+    or a TOML file written as assets/waters are."""
     attenuation: float | None = None
     """Beam attenuation at 450 nm in 1/m, in place of the preset's, by more or less scattering."""
     turbidity: float | None = None

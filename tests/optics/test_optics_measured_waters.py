@@ -1,12 +1,17 @@
 import itertools
+import math
 
 import jerlov
 import numpy as np
 import pytest
 from test_optics_water import JERLOV_KD, JERLOV_NM, PURE_ABSORPTION
 
+from auvdock.core.errors import ConfigError
 from auvdock.optics.bands import BANDS_NM
-from auvdock.optics.water import load_water
+from auvdock.optics.photons.mixture import shares_of
+from auvdock.optics.photons.phase import load_phase
+from auvdock.optics.photons.table import photon_halo_of
+from auvdock.optics.water import load_water, water_of
 
 TYPES = tuple(JERLOV_KD)
 MEASURED = ("IB", "II", "III", "1C", "3C", "5C")
@@ -85,3 +90,57 @@ def test_petzolds_waters_in_other_bands(name):
     particles = water.scattering - PURE_SCATTERING
     power = np.log(particles[:-1] / particles[1:]) / np.log(np.array(BANDS_NM[1:]) / BANDS_NM[:-1])
     assert np.all((power > 0.2) & (power < 0.7))
+
+
+def turbid(c_530):
+    return water_of("pool", turbidity_per_m=c_530)
+
+
+@pytest.mark.parametrize("c_530", [0.151, 0.2, 0.398, 0.5, 1.0, 1.92])
+def test_turbidity_is_the_attenuation_where_petzold_measured(c_530):
+    assert turbid(c_530).attenuation[1] == pytest.approx(c_530)
+
+
+@pytest.mark.parametrize("name", STATIONS)
+def test_at_a_station_the_turbid_water_is_the_stations(name):
+    turbidity, station = turbid(STATIONS[name][0]), load_water(f"petzold_{name}")
+    assert turbidity.phase == station.phase
+    assert (turbidity.absorption, turbidity.scattering) == (
+        pytest.approx(station.absorption),
+        pytest.approx(station.scattering),
+    )
+
+
+@pytest.mark.parametrize(("ends", "part"), [(("clear", "coastal"), 0.3), (("coastal", "harbour"), 0.7)])
+def test_between_two_stations_it_scatters_as_both_waters_stirred_together(ends, part):
+    one, other = (load_water(f"petzold_{name}") for name in ends)
+    mixed = turbid(float((1.0 - part) * one.attenuation[1] + part * other.attenuation[1]))
+    assert mixed.absorption == pytest.approx((1.0 - part) * one.absorption + part * other.absorption)
+    assert mixed.scattering == pytest.approx((1.0 - part) * one.scattering + part * other.scattering)
+    angle = np.radians([0.1, 1.0, 10.0, 90.0, 150.0])
+    function = mixed.scattering[1] * load_phase(mixed.phase).density(angle)
+    stirred = [
+        share * water.scattering[1] * load_phase(water.phase).density(angle)
+        for share, water in ((1.0 - part, one), (part, other))
+    ]
+    assert function == pytest.approx(np.sum(stirred, axis=0), rel=1e-3)
+
+
+def test_a_turbid_waters_halo_lies_between_those_of_its_stations():
+    angle = np.radians([0.2, 1.0, 5.0, 20.0])
+    within = [photon_halo_of(turbid(c)).within(3.0, 0.3, angle) for c in (0.398, 0.5, 0.8, 1.3, 1.92)]
+    assert np.all(np.diff(within, axis=0) * np.sign(within[-1] - within[0]) > 0.0)
+    assert math.isclose(sum(shares_of(turbid(0.8).phase).values()), 1.0)
+
+
+@pytest.mark.parametrize("c_530", [0.15, 1.921, 0.0, -1.0, math.nan, math.inf])
+def test_beyond_petzolds_waters_a_turbidity_is_refused_with_their_range(c_530):
+    with pytest.raises(ConfigError, match=r"0\.151 1/m.* 1\.92 1/m") as caught:
+        turbid(c_530)
+    assert caught.value.field == "turbidity_per_m"
+
+
+def test_two_turbidities_are_refused():
+    with pytest.raises(ConfigError, match="attenuation_per_m") as caught:
+        water_of("pool", 0.5, 0.5)
+    assert caught.value.field == "turbidity_per_m"
