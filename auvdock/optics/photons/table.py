@@ -17,13 +17,13 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from auvdock.assets import asset, asset_names
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, IntArray
 from auvdock.core.errors import ConfigError
 from auvdock.optics.photons.making import ABSORPTION, ANGLE_RAD, RADIUS, HaloGrid
 from auvdock.optics.photons.phase import FOURNIER_FORAND
 from auvdock.optics.water import WaterCfg
 
-__all__ = ["PhotonHalo", "halo_names", "load_halo", "phase_of", "read_halo", "save_halo"]
+__all__ = ["PhotonHalo", "halo_names", "load_halo", "phase_of", "photon_halo_of", "read_halo", "save_halo"]
 
 _FARTHEST = 60.0
 """b r up to which a reading is extrapolated."""
@@ -69,61 +69,60 @@ class PhotonHalo:
         Raises:
             ConfigError: beyond the table.
         """
-        rows = self._curve(br, absorption)
-        self._check_angles(angle_rad)
-        slope = (rows[1] - rows[0]) / (self.log_angle[1] - self.log_angle[0])
-        at = np.log(np.maximum(angle_rad, 1e-30))
-        inner = np.minimum(at - self.log_angle[0], 0.0)
-        return np.exp(self._angular(rows)(np.maximum(at, self.log_angle[0])) + slope * inner)
+        return self.read(np.array([br]), absorption, angle_rad)[0][0]
 
     def radiance(self, br: float, absorption: float, angle_rad: Array) -> Array:
         """(j,) halo per steradian at angles (j,) above 0 off the lamp: the derivative of `within`."""
-        rows = self._curve(br, absorption)
-        curve = self._angular(rows)
-        at = np.log(angle_rad)
-        slope = np.where(
-            at < self.log_angle[0],
-            (rows[1] - rows[0]) / (self.log_angle[1] - self.log_angle[0]),
-            curve.derivative()(np.maximum(at, self.log_angle[0])),
-        )
-        ring = 2.0 * math.pi * np.sin(angle_rad) * angle_rad
-        return self.within(br, absorption, angle_rad) * slope / ring
+        return self.read(np.array([br]), absorption, angle_rad)[1][0]
+
+    def read(self, br: Array, absorption: float, angle_rad: Array) -> tuple[Array, Array]:
+        """(n, j) `within` and (n, j) `radiance` at many b r (n,)."""
+        rows = self._curves(br, absorption)
+        self._check_angles(angle_rad)
+        curves = PchipInterpolator(self.log_angle, rows, axis=1)
+        angle = np.maximum(angle_rad, 1e-30)
+        at = np.log(angle)
+        inside, held = at < self.log_angle[0], np.maximum(at, self.log_angle[0])
+        power = (rows[:, 1:2] - rows[:, :1]) / (self.log_angle[1] - self.log_angle[0])
+        within = np.exp(curves(held) + power * np.minimum(at - self.log_angle[0], 0.0))
+        slope = np.where(inside, power, curves(held, 1))
+        return within, within * slope / (2.0 * math.pi * np.sin(angle) * angle)
 
     def standard_error(self, br: float, absorption: float, angle_rad: Array) -> Array:
         """(j,) standard error of `within` relative to it, for the number of photons; that of the nearest rows."""
-        self._curve(br, absorption)
+        self._check_depth(np.array([br]), absorption)
         self._check_angles(angle_rad)
         i = int(np.argmin(np.abs(self.log_br - math.log(br))))
         j = int(np.argmin(np.abs(self.log_absorption - math.log(absorption))))
         return np.interp(np.log(np.maximum(angle_rad, 1e-30)), self.log_angle, self.error[i, j])
 
-    def _curve(self, br: float, absorption: float) -> Array:
-        """Logarithm of the halo (m,) at the table's angles."""
+    def _check_depth(self, br: Array, absorption: float) -> None:
         low, high = math.exp(self.log_absorption[0]), math.exp(self.log_absorption[-1])
         if not low * (1 - 1e-9) <= absorption <= high * (1 + 1e-9):
             raise ConfigError("halo.absorption_over_scattering", absorption, f"a / b of {low:g} to {high:g}")
-        if not 0.0 < br <= _FARTHEST:
-            raise ConfigError("halo.scattering_depth", br, f"b r above 0 and up to {_FARTHEST:g}")
-        table_br = np.exp(self.log_br)
-        i, u = _neighbours(self.log_br, math.log(min(max(br, table_br[0]), table_br[-1])))
-        j, v = _neighbours(self.log_absorption, math.log(absorption))
-        rows = np.einsum("i,j,ijm->m", u, v, self.log_within[i : i + 4, j : j + 4])
-        if br < table_br[0]:  # halo over b r, of which the logarithm is straight where all is scattered once
-            first, second = np.einsum("j,ijm->im", v, self.log_within[:2, j : j + 4])
-            slope = (second - first - math.log(table_br[1] / table_br[0])) / (table_br[1] - table_br[0])
-            rows = rows + slope * (br - table_br[0]) + math.log(br / table_br[0])
-        elif br > table_br[-1]:
-            before, last = np.einsum("j,ijm->im", v, self.log_within[-2:, j : j + 4])
-            slope = (last - before) / (table_br[-1] - table_br[-2])
-            # Further in, radiance is even and its fall with b r the same, but the photons are too few to tell it.
-            even = int(np.searchsorted(self.log_angle, math.log(_EVEN_RAD)))
-            slope[:even] = slope[even]
-            rows = rows + slope * (br - table_br[-1])
-        # Rounding and noise must not take light away from a wider cone.
-        return np.maximum.accumulate(rows)
+        for value in br.tolist():
+            if not 0.0 < value <= _FARTHEST:
+                raise ConfigError("halo.scattering_depth", value, f"b r above 0 and up to {_FARTHEST:g}")
 
-    def _angular(self, rows: Array) -> PchipInterpolator:
-        return PchipInterpolator(self.log_angle, rows)
+    def _curves(self, br: Array, absorption: float) -> Array:
+        """Logarithm of the halo (n, m) at the table's angles, for b r (n,)."""
+        self._check_depth(br, absorption)
+        table_br = np.exp(self.log_br)
+        j, v = _neighbours(self.log_absorption, np.array([math.log(absorption)]))
+        table = np.einsum("j,ijm->im", v[0], self.log_within[:, j[0] : j[0] + 4])
+        i, u = _neighbours(self.log_br, np.log(np.clip(br, table_br[0], table_br[-1])))
+        rows = np.einsum("ni,nim->nm", u, table[i[:, None] + np.arange(4)])
+        # Below: halo over b r, of which the logarithm is straight where all is scattered once.
+        first = (table[1] - table[0] - math.log(table_br[1] / table_br[0])) / (table_br[1] - table_br[0])
+        below = np.minimum(br, table_br[0])[:, None]
+        rows += first * (below - table_br[0]) + np.log(below / table_br[0])
+        # Beyond: further in, radiance is even and its fall with b r the same, but the photons are too few to tell it.
+        last = (table[-1] - table[-2]) / (table_br[-1] - table_br[-2])
+        even = int(np.searchsorted(self.log_angle, math.log(_EVEN_RAD)))
+        last[:even] = last[even]
+        rows += last * np.maximum(br - table_br[-1], 0.0)[:, None]
+        # Rounding and noise must not take light away from a wider cone.
+        return np.maximum.accumulate(rows, axis=1)
 
     def _check_angles(self, angle_rad: Array) -> None:
         if not (np.all(angle_rad >= 0.0) and np.all(angle_rad <= math.pi / 2.0 + 1e-12)):
@@ -148,6 +147,15 @@ def load_halo(name: str) -> PhotonHalo:
 def phase_of(water: WaterCfg) -> str:
     """Name of the phase function of a water: Fournier and Forand's with its share of backscattering."""
     return f"{FOURNIER_FORAND}{water.backscatter_ratio:.3f}"
+
+
+def photon_halo_of(water: WaterCfg) -> PhotonHalo:
+    """The halo of a water's phase function, as it ships.
+
+    Raises:
+        ConfigError: none is shipped for that phase function.
+    """
+    return load_halo(phase_of(water))
 
 
 def save_halo(grid: HaloGrid, path: Path) -> None:
@@ -185,10 +193,10 @@ def read_halo(path: Path | Traversable) -> PhotonHalo:
         )
 
 
-def _neighbours(even: Array, at: float) -> tuple[int, Array]:
-    """First of four neighbours on an even grid and their weights (4,) in the cubic through them."""
+def _neighbours(even: Array, at: Array) -> tuple[IntArray, Array]:
+    """First of four neighbours (n,) on an even grid and their weights (n, 4) in the cubics through them."""
     place = (at - even[0]) / (even[1] - even[0])
-    first = min(max(int(place) - 1, 0), len(even) - 4)
+    first = np.clip(place.astype(np.int64) - 1, 0, len(even) - 4)
     t = place - first
     weights = [
         -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
@@ -196,4 +204,4 @@ def _neighbours(even: Array, at: float) -> tuple[int, Array]:
         -t * (t - 1.0) * (t - 3.0) / 2.0,
         t * (t - 1.0) * (t - 2.0) / 6.0,
     ]
-    return first, np.array(weights)
+    return first, np.stack(weights, axis=1)
