@@ -18,12 +18,12 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from auvdock.assets import asset, asset_names
-from auvdock.core.arrays import Array
+from auvdock.core.arrays import Array, IntArray
 from auvdock.core.errors import ConfigError
 from auvdock.optics.photons.making import ABSORPTION, ANGLE_RAD, RADIUS, HaloGrid
 from auvdock.optics.photons.mixture import shares_of
-from auvdock.optics.photons.wells import wells_within
 from auvdock.optics.water import WELLS, WaterCfg
+from auvdock.optics.wells import wells_halo
 
 __all__ = ["PhotonHalo", "halo_names", "load_halo", "photon_halo_of", "read_halo", "save_halo"]
 
@@ -72,69 +72,69 @@ class PhotonHalo:
         Raises:
             ConfigError: beyond the table.
         """
-        rows = self._curve(br, absorption)
-        self._check_angles(angle_rad)
-        slope = (rows[1] - rows[0]) / (self.log_angle[1] - self.log_angle[0])
-        at = np.log(np.maximum(angle_rad, 1e-30))
-        inner = np.minimum(at - self.log_angle[0], 0.0)
-        return np.exp(self._angular(rows)(np.maximum(at, self.log_angle[0])) + slope * inner)
+        return self.read(np.array([br]), absorption, angle_rad)[0][0]
 
     def radiance(self, br: float, absorption: float, angle_rad: Array) -> Array:
         """(j,) halo per steradian at angles (j,) above 0 off the lamp: the derivative of `within`."""
-        rows = self._curve(br, absorption)
-        curve = self._angular(rows)
-        at = np.log(angle_rad)
-        slope = np.where(
-            at < self.log_angle[0],
-            (rows[1] - rows[0]) / (self.log_angle[1] - self.log_angle[0]),
-            curve.derivative()(np.maximum(at, self.log_angle[0])),
-        )
-        ring = 2.0 * math.pi * np.sin(angle_rad) * angle_rad
-        return self.within(br, absorption, angle_rad) * slope / ring
+        return self.read(np.array([br]), absorption, angle_rad)[1][0]
+
+    def read(self, br: Array, absorption: float, angle_rad: Array) -> tuple[Array, Array]:
+        """(n, j) `within` and (n, j) `radiance` at many b r (n,)."""
+        rows = self._curves(br, absorption)
+        self._check_angles(angle_rad)
+        curves = PchipInterpolator(self.log_angle, rows, axis=1)
+        angle = np.maximum(angle_rad, 1e-30)
+        at = np.log(angle)
+        inside, held = at < self.log_angle[0], np.maximum(at, self.log_angle[0])
+        power = (rows[:, 1:2] - rows[:, :1]) / (self.log_angle[1] - self.log_angle[0])
+        within = np.exp(curves(held) + power * np.minimum(at - self.log_angle[0], 0.0))
+        slope = np.where(inside, power, curves(held, 1))
+        return within, within * slope / (2.0 * math.pi * np.sin(angle) * angle)
 
     def standard_error(self, br: float, absorption: float, angle_rad: Array) -> Array:
         """(j,) standard error of `within` relative to it, for the number of photons; that of the nearest rows."""
-        self._curve(br, absorption)
+        self._check_depth(np.array([br]), absorption)
         self._check_angles(angle_rad)
         i = int(np.argmin(np.abs(self.log_br - math.log(br))))
         j = int(np.argmin(np.abs(self.log_absorption - math.log(absorption))))
         return np.interp(np.log(np.maximum(angle_rad, 1e-30)), self.log_angle, self.error[i, j])
 
-    def _curve(self, br: float, absorption: float) -> Array:
-        """Logarithm of the halo (m,) at the table's angles."""
+    def _check_depth(self, br: Array, absorption: float) -> None:
         low = math.exp(self.log_absorption[0])
         if not low * (1 - 1e-9) <= absorption < math.inf:
             raise ConfigError("halo.absorption_over_scattering", absorption, f"a finite a / b of at least {low:g}")
-        if not 0.0 < br <= _FARTHEST:
-            raise ConfigError("halo.scattering_depth", br, f"b r above 0 and up to {_FARTHEST:g}")
+        for value in br.tolist():
+            if not 0.0 < value <= _FARTHEST:
+                raise ConfigError("halo.scattering_depth", value, f"b r above 0 and up to {_FARTHEST:g}")
+
+    def _curves(self, br: Array, absorption: float) -> Array:
+        """Logarithm of the halo (n, m) at the table's angles, for b r (n,)."""
+        self._check_depth(br, absorption)
         table_br = np.exp(self.log_br)
-        i, u = _neighbours(self.log_br, math.log(min(max(br, table_br[0]), table_br[-1])))
         j, v = self._absorption_neighbours(math.log(absorption))
-        rows = np.einsum("i,j,ijm->m", u, v, self.log_within[i : i + 4, j : j + 4])
-        if br < table_br[0]:  # halo over b r, of which the logarithm is straight where all is scattered once
-            first, second = np.einsum("j,ijm->im", v, self.log_within[:2, j : j + 4])
-            slope = (second - first - math.log(table_br[1] / table_br[0])) / (table_br[1] - table_br[0])
-            rows = rows + slope * (br - table_br[0]) + math.log(br / table_br[0])
-        elif br > table_br[-1]:
-            before, last = np.einsum("j,ijm->im", v, self.log_within[-2:, j : j + 4])
-            slope = (last - before) / (table_br[-1] - table_br[-2])
-            # Further in, radiance is even and its fall with b r the same, but the photons are too few to tell it.
-            even = int(np.searchsorted(self.log_angle, math.log(_EVEN_RAD)))
-            slope[:even] = slope[even]
-            rows = rows + slope * (br - table_br[-1])
+        table = np.einsum("j,ijm->im", v, self.log_within[:, j : j + 4])
+        i, u = _neighbours(self.log_br, np.log(np.clip(br, table_br[0], table_br[-1])))
+        rows = np.einsum("ni,nim->nm", u, table[i[:, None] + np.arange(4)])
+        # Below: halo over b r, of which the logarithm is straight where all is scattered once.
+        first = (table[1] - table[0] - math.log(table_br[1] / table_br[0])) / (table_br[1] - table_br[0])
+        below = np.minimum(br, table_br[0])[:, None]
+        rows += first * (below - table_br[0]) + np.log(below / table_br[0])
+        # Beyond: further in, radiance is even and its fall with b r the same, but the photons are too few to tell it.
+        last = (table[-1] - table[-2]) / (table_br[-1] - table_br[-2])
+        even = int(np.searchsorted(self.log_angle, math.log(_EVEN_RAD)))
+        last[:even] = last[even]
+        rows += last * np.maximum(br - table_br[-1], 0.0)[:, None]
         # Rounding and noise must not take light away from a wider cone.
-        return np.maximum.accumulate(rows)
+        return np.maximum.accumulate(rows, axis=1)
 
     def _absorption_neighbours(self, at: float) -> tuple[int, Array]:
         """Four neighbours over log a / b; beyond the last, weights of the straight line through the last two."""
         last, before = self.log_absorption[-1], self.log_absorption[-2]
         if at <= last:
-            return _neighbours(self.log_absorption, at)
+            first, weights = _neighbours(self.log_absorption, np.array([at]))
+            return int(first[0]), weights[0]
         t = (at - last) / (last - before)
         return len(self.log_absorption) - 4, np.array([0.0, 0.0, -t, 1.0 + t])
-
-    def _angular(self, rows: Array) -> PchipInterpolator:
-        return PchipInterpolator(self.log_angle, rows)
 
     def _check_angles(self, angle_rad: Array) -> None:
         if not (np.all(angle_rad >= 0.0) and np.all(angle_rad <= math.pi / 2.0 + 1e-12)):
@@ -219,15 +219,15 @@ def _mixed(name: str, shares: Mapping[str, float]) -> PhotonHalo:
 
 @lru_cache(maxsize=8)
 def _wells(theta0_rad: float) -> PhotonHalo:
-    within = np.log(wells_within(theta0_rad, RADIUS, ANGLE_RAD))
+    within = np.log(wells_halo(theta0_rad).encircled(RADIUS, ANGLE_RAD))
     table = np.repeat(within[:, None, :], len(ABSORPTION), axis=1)
     return PhotonHalo(WELLS, 0, np.log(RADIUS), np.log(ABSORPTION), np.log(ANGLE_RAD), table, np.zeros_like(table))
 
 
-def _neighbours(even: Array, at: float) -> tuple[int, Array]:
-    """First of four neighbours on an even grid and their weights (4,) in the cubic through them."""
+def _neighbours(even: Array, at: Array) -> tuple[IntArray, Array]:
+    """First of four neighbours (n,) on an even grid and their weights (n, 4) in the cubics through them."""
     place = (at - even[0]) / (even[1] - even[0])
-    first = min(max(int(place) - 1, 0), len(even) - 4)
+    first = np.clip(place.astype(np.int64) - 1, 0, len(even) - 4)
     t = place - first
     weights = [
         -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
@@ -235,4 +235,4 @@ def _neighbours(even: Array, at: float) -> tuple[int, Array]:
         -t * (t - 1.0) * (t - 3.0) / 2.0,
         t * (t - 1.0) * (t - 2.0) / 6.0,
     ]
-    return first, np.array(weights)
+    return first, np.stack(weights, axis=1)
