@@ -53,9 +53,13 @@ class LandingWorldCfg(Checked):
     fidelity: Fidelity = "pixels"
     """"pixels" or "beacons"."""
     water: str | WaterCfg = "clear"
-    """Water preset (Jerlov "I" to "9C", "clear", "pool", "lake"), a TOML file of one's own, or that file's content."""
+    """Water preset (Jerlov "I" to "9C", "petzold_clear" to "petzold_harbour", "clear", "pool", "lake"), a TOML file of
+    one's own, or that file's content."""
     attenuation_per_m: float | None = None
-    """Beam attenuation c at 450 nm in 1/m in place of the preset's."""
+    """Beam attenuation c at 450 nm in 1/m in place of the preset's, by more or less scattering alone."""
+    turbidity_per_m: float | None = None
+    """Beam attenuation c at 530 nm in 1/m, 0.151 to 1.92, of a water between those that Petzold measured, in place of
+    `water`: absorption, scattering and phase function move together. Not with `attenuation_per_m`."""
     detection_model: str | None = None
     """TOML file of a fitted detection model of the lights for the beacons fidelity, in place of the detector's own."""
     station: LandingStationCfg = field(default_factory=load_landing_station)

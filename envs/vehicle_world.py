@@ -25,7 +25,7 @@ from auvdock.envs.landing_config import LandingWorldCfg
 from auvdock.envs.latency import CommandLink
 from auvdock.optics.detection_model import DetectionModelCfg, load_detection_model
 from auvdock.optics.imaging import UnderwaterCamera
-from auvdock.optics.water import load_water, with_attenuation
+from auvdock.optics.water import water_of
 from auvdock.sim.ocean import CurrentCfg
 from auvdock.sim.simulator import Simulator
 from auvdock.sim.truth import Truth
@@ -85,9 +85,7 @@ class VehicleWorld(ABC):
         with located("world.camera."):
             self.camera = make_camera(vehicle)
         with located("world."):
-            self.water = load_water(cfg.water)
-            if cfg.attenuation_per_m is not None:
-                self.water = with_attenuation(self.water, cfg.attenuation_per_m)
+            self.water = water_of(cfg.water, cfg.attenuation_per_m, cfg.turbidity_per_m)
         self.simulator = Simulator(cfg.sim, station, vehicle)  # last: its loops may have to be compiled
         self._limits, self._hold_s, self._control_s = cfg.limits, station.latch.hold_s, 1.0 / cfg.control_hz
         self._steps_per_control = round(cfg.sim.physics_hz / cfg.control_hz)

@@ -10,12 +10,12 @@ import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.errors import ConfigError
-from auvdock.optics.halo import halo_table
 from auvdock.optics.photons.making import left_after, ring_radiance
 from auvdock.optics.photons.phase import load_phase
-from auvdock.optics.photons.table import load_halo, phase_of
+from auvdock.optics.photons.table import load_halo, photon_halo_of
 from auvdock.optics.photons.walk import Tally, shoot
 from auvdock.optics.water import WaterCfg
+from auvdock.optics.wells import wells_halo
 
 __all__ = ["CHECKED_A_B", "CHECKED_BR", "HALF_ANGLES_DEG", "PHASES", "HaloCase", "HaloCheck", "check_halo", "halo_case"]
 
@@ -90,7 +90,7 @@ def check_halo(name: str, photons: int, seed: int, told: Callable[[], object]) -
     halo, read = load_halo(name), np.radians(HALF_ANGLES_DEG)
     table = [[halo.within(br, x, read) for x in CHECKED_A_B] for br in CHECKED_BR]
     table_error = [[halo.standard_error(br, x, read) for x in CHECKED_A_B] for br in CHECKED_BR]
-    wells = [[halo_table(theta0).encircled(br, read) for br in CHECKED_BR] for theta0 in WELLS_RAD]
+    wells = [wells_halo(theta0).encircled(np.array(CHECKED_BR), read) for theta0 in WELLS_RAD]
     return HaloCheck(
         name,
         photons // _BATCHES * _BATCHES,
@@ -150,15 +150,15 @@ def halo_case(water: WaterCfg, range_m: float, wavelength_nm: float) -> HaloCase
     a, b = water.absorption_at(wavelength_nm), water.scattering_at(wavelength_nm)
     if b <= 0.0:
         raise ConfigError("attenuation", a + b, "more than the water's absorption: what does not scatter has no halo")
-    phase, angle, left = phase_of(water), np.radians(HALF_ANGLES_DEG), math.exp(-a * range_m)
-    halo = load_halo(phase)
+    angle, left = np.radians(HALF_ANGLES_DEG), math.exp(-a * range_m)
+    halo = photon_halo_of(water)
     return HaloCase(
-        phase=phase,
+        phase=halo.phase,
         absorption_per_m=a,
         scattering_per_m=b,
         scattering_depth=b * range_m,
         core=left * math.exp(-b * range_m),
         halo=left * halo.within(b * range_m, a / b, angle),
         error=halo.standard_error(b * range_m, a / b, angle),
-        wells=left * halo_table(water.scattering_angle_rad).encircled(b * range_m, angle),
+        wells=left * wells_halo(water.scattering_angle_rad).encircled(np.array([b * range_m]), angle)[0],
     )

@@ -20,6 +20,7 @@ from auvdock.episode.config import AnyEpisodeCfg
 __all__ = [
     "ALIASES",
     "KIND_WORDS",
+    "TURBIDITY_AXES",
     "WATER_AXES",
     "AxisCfg",
     "AxisValue",
@@ -39,6 +40,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "gust": ("world.sim.current.gust_std_m_s",),
     "shear": ("world.sim.current.shear_per_m",),
     "attenuation": ("world.attenuation_per_m",),
+    "turbidity": ("world.turbidity_per_m",),
     "water": ("world.water",),
     "flicker": ("world.nuisance.flicker",),
     "marine_snow": ("world.nuisance.marine_snow",),
@@ -58,6 +60,9 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
 
 WATER_AXES = ("water", "world.water")
 """Names of the axis that varies the water, whose values may be files."""
+
+TURBIDITY_AXES = ("turbidity", "world.turbidity_per_m")
+"""Names of the axis along Petzold's waters, each of which is a water of its own."""
 
 Distribution = Literal["uniform", "log_uniform", "normal"]
 """`normal` has 95 % of its mass between low and high and is cut off there."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import Annotated, Any, Literal
 
-from auvdock.campaign.axes import WATER_AXES, AxisCfg, AxisValue, axis_kind, joined
+from auvdock.campaign.axes import TURBIDITY_AXES, WATER_AXES, AxisCfg, AxisValue, axis_kind, joined
 from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError, located
 from auvdock.core.limits import Positive, at_least, below, between
@@ -61,6 +61,8 @@ class CampaignCfg(Checked):
         names = [axis.name for axis in self.axes]
         if len(set(names)) != len(names):
             raise ConfigError("axes", names, "each axis once")
+        if any(name in WATER_AXES for name in names) and any(name in TURBIDITY_AXES for name in names):
+            raise ConfigError("axes", names, "either a water or a turbidity, which is a water of its own")
         for axis in self.axes:
             unknown = [value for value in self._ends(axis) if value not in LEVELS] if axis.name == "level" else []
             if unknown:

@@ -34,9 +34,13 @@ class DockFlags(ABC):
     controller: str | None = None
     """A pilot of your own as package.module:Name, in place of the station's."""
     water: str | None = None
-    """Water preset (I, IA, IB, II, III, 1C to 9C, clear, pool, lake), or a TOML file written as assets/waters are."""
+    """Water preset (I, IA, IB, II, III, 1C to 9C, petzold_clear, petzold_coastal, petzold_harbour, clear, pool, lake),
+    or a TOML file written as assets/waters are."""
     attenuation: float | None = None
-    """Beam attenuation at 450 nm in 1/m, in place of the preset's."""
+    """Beam attenuation at 450 nm in 1/m, in place of the preset's, by more or less scattering."""
+    turbidity: float | None = None
+    """Beam attenuation at 530 nm in 1/m of a water between those that Petzold measured (0.151 to 1.92), in place of
+    --water."""
     current: float | None = None
     """Speed of the current in m/s."""
     current_direction: str | None = None
@@ -76,6 +80,10 @@ class DockFlags(ABC):
             world["water"] = self.water
         if self.attenuation is not None:
             world["attenuation_per_m"] = self.attenuation
+        if self.turbidity is not None:
+            if self.water is not None:
+                raise ConfigError("turbidity", self.turbidity, "either it or --water: it is a water of its own")
+            world["turbidity_per_m"] = self.turbidity
         if self.current is not None:
             world.setdefault("sim", {}).setdefault("current", {})["speed_m_s"] = self.current
         if self.current_direction is not None:

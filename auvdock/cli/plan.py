@@ -49,7 +49,8 @@ class Plan:
     station: Annotated[Path, tyro.conf.Positional]
     """TOML file of a conical station, as assets/stations/conical.toml."""
     water: str = "pool"
-    """Water preset (I, IA, IB, II, III, 1C to 9C, clear, pool, lake), or a TOML file written as assets/waters are."""
+    """Water preset (I, IA, IB, II, III, 1C to 9C, petzold_clear, petzold_coastal, petzold_harbour, clear, pool, lake),
+    or a TOML file written as assets/waters are."""
     attenuation: float | None = None
     """Beam attenuation at 450 nm in 1/m, in place of the preset's."""
     min_lights: int = 4

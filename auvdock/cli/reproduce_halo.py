@@ -32,7 +32,7 @@ from auvdock.experiments.halo_picture import draw_halo
 from auvdock.optics.photons.making import BATCHES, count_photons, make_grid
 from auvdock.optics.photons.phase import load_phase
 from auvdock.optics.photons.table import load_halo, save_halo
-from auvdock.optics.water import load_water, with_attenuation
+from auvdock.optics.water import water_of
 from auvdock.planning.pictures import make_folder
 
 __all__ = ["Halo", "run_halo"]
@@ -58,6 +58,8 @@ class Halo:
     """Distance to the lamp in m, for one case."""
     attenuation: float | None = None
     """Turbidity of that water: c = a + b at 450 nm in 1/m, by more or less scattering; by default the preset's."""
+    turbidity: float | None = None
+    """In place of --water: c at 530 nm in 1/m of a water between those that Petzold measured."""
     wavelength_nm: float = 450.0
     """Of the lamp in that one case; by default the blue lamps'."""
     phases: tuple[str, ...] | None = None
@@ -77,8 +79,8 @@ class Halo:
 def run_halo(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(Halo, argv, prog)
-    if args.water is not None:
-        return _case(args, args.water)
+    if args.water is not None or args.turbidity is not None:
+        return _case(args)
     for name in ("range_m", "attenuation"):
         if getattr(args, name) is not None:
             raise ConfigError(name.removesuffix("_m"), getattr(args, name), "goes with --water NAME, for one case")
@@ -120,13 +122,14 @@ def run_halo(argv: Sequence[str], prog: str) -> int:
     return saving.finish(exit_codes.DONE if good else exit_codes.NOT_MET)
 
 
-def _case(args: Halo, name: str) -> int:
+def _case(args: Halo) -> int:
     if args.range_m is None:
         raise ConfigError("range", None, "--range M, the distance to the lamp")
-    water = load_water(name)
-    if args.attenuation is not None:
-        with named_by_flag(attenuation_per_m="attenuation"):
-            water = with_attenuation(water, args.attenuation)
+    if args.water is not None and args.turbidity is not None:
+        raise ConfigError("turbidity", args.turbidity, "either it or --water: it is a water of its own")
+    with named_by_flag(attenuation_per_m="attenuation", turbidity_per_m="turbidity"):
+        water = water_of(args.water or "", args.attenuation, args.turbidity)
+    name = args.water or water.name
     case = halo_case(water, args.range_m, args.wavelength_nm)
     halo, wells = _by_angle(case.halo), _by_angle(case.wells)
     plain = {

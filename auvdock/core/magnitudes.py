@@ -25,6 +25,7 @@ _GREATEST: dict[str, tuple[float, str]] = {
     "per_s": (1e9, "1/s"),
     "1_s": (1e9, "1/s"),
     "attenuation": (100.0, "1/m"),
+    "turbidity": (100.0, "1/m"),
     "current": (1e3, "m/s"),
     "m": (11_000.0, "m, the ocean's greatest depth"),
     "m_s": (1e3, "m/s"),

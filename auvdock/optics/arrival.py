@@ -12,12 +12,22 @@ from typing import Annotated
 
 import numpy as np
 
-from auvdock.core.arrays import Array, BoolArray
+from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.lens import CX, CY, FX, FY, K1, K2, K3, pixel_of, radial_factor
 from auvdock.numeric.records import Record, Records
 
-__all__ = ["Arrival", "Lamp", "Projection", "Rim", "arrive", "arrive_everywhere", "locate"]
+__all__ = [
+    "Arrival",
+    "HaloPlaces",
+    "Lamp",
+    "Projection",
+    "Rim",
+    "arrive",
+    "arrive_everywhere",
+    "locate",
+    "place_in_halo",
+]
 
 _NEAREST_M2 = 1e-4
 
@@ -41,8 +51,22 @@ class Lamp(Record):
     """Radiant flux."""
     electrons_per_j: Annotated[Array, 3]
     """Photo-electrons of the red, green and blue channel per joule of this light on a pixel."""
+    halo_row: int
+    """First row of its wavelength in the water's halo (`optics.halo`)."""
     recessed: bool
     """It sits inside the funnel and is seen through the mouth only."""
+
+
+@dataclass(frozen=True)
+class HaloPlaces(Record):
+    """Where in a block of the halo's table a scattering depth is; rows are even in ln(1 + b r / bend)."""
+
+    bend: float
+    """b r beyond which the rows are even in its logarithm, below which in b r itself."""
+    per_log: float
+    """Rows per unit of that logarithm."""
+    last: float
+    """Last row; beyond it is held."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +108,11 @@ class Arrival(Record):
     core_w_m2: float
     """Irradiance of the unscattered light, normal to the ray: I f(θ) e^{-(a+b) r} / r²."""
     halo_w_m2: float
-    """Irradiance of the forward-scattered light: I f(θ) e^{-a r} (1 - e^{-b r}) / r²."""
+    """Irradiance of the scattered light within 90°: I f(θ) e^{-a r} (1 - e^{-b r}) w / r², w `HaloTable.whole`."""
+    halo_row: int
+    """Row of the halo's table below its b r."""
+    halo_weight: float
+    """Weight of the row above."""
     pixel: Annotated[Array, 2]
     """Position on the sensor; means something where `inside` or near it."""
     inside: bool
@@ -96,24 +124,53 @@ _ARRIVAL = Arrival.dtype()
 
 @compiled
 def arrive(
-    T_station_camera: Array, lamps: Records[Lamp], rim: Records[Rim], projection: Records[Projection]
+    T_station_camera: Array,
+    lamps: Records[Lamp],
+    rim: Records[Rim],
+    projection: Records[Projection],
+    places: Records[HaloPlaces],
+    whole: Array,
 ) -> Records[Arrival]:
-    """The light of lamps (n,) at a camera pose (4, 4); `rim` and `projection` have one row."""
+    """The light of lamps (n,) at a camera pose (4, 4).
+
+    Args:
+        T_station_camera: the pose.
+        lamps: (n,).
+        rim: one row.
+        projection: one row.
+        places: one row, of the halo's table.
+        whole: (h,) all of the halo over 1 - e^{-b r}, by the table's rows.
+    """
     arrivals: Records[Arrival] = np.empty(len(lamps), dtype=_ARRIVAL)  # type: ignore[assignment]  # of records
-    _fill(arrivals, T_station_camera, lamps, rim[0], projection[0])
+    _fill(arrivals, T_station_camera, lamps, rim[0], projection[0], places[0], whole)
     return arrivals
 
 
 @compiled
 def arrive_everywhere(
-    T_station_camera: Array, lamps: Records[Lamp], rim: Records[Rim], projection: Records[Projection]
+    T_station_camera: Array,
+    lamps: Records[Lamp],
+    rim: Records[Rim],
+    projection: Records[Projection],
+    places: Records[HaloPlaces],
+    whole: Array,
 ) -> Records[Arrival]:
     """(m n,) the light of lamps (n,) at camera poses (m, 4, 4), pose by pose: `arrive` for planners."""
     count = len(lamps)
     arrivals: Records[Arrival] = np.empty(len(T_station_camera) * count, dtype=_ARRIVAL)  # type: ignore[assignment]  # of records
     for k in range(len(T_station_camera)):
-        _fill(arrivals[k * count : (k + 1) * count], T_station_camera[k], lamps, rim[0], projection[0])
+        one = arrivals[k * count : (k + 1) * count]
+        _fill(one, T_station_camera[k], lamps, rim[0], projection[0], places[0], whole)
     return arrivals
+
+
+@compiled
+def place_in_halo(br: Array, places: Records[HaloPlaces]) -> tuple[IntArray, Array]:
+    """Row (n,) of a block of the halo's table below each b r (n,) and the weight (n,) of the row above."""
+    row, weight = np.empty(len(br), dtype=np.int64), np.empty(len(br))
+    for i in range(len(br)):
+        row[i], weight[i] = _place(br[i], places[0])
+    return row, weight
 
 
 @compiled
@@ -127,7 +184,13 @@ def locate(rays: Array, projection: Records[Projection]) -> tuple[Array, BoolArr
 
 @compiled
 def _fill(
-    arrivals: Records[Arrival], T_station_camera: Array, lamps: Records[Lamp], rim: Rim, projection: Projection
+    arrivals: Records[Arrival],
+    T_station_camera: Array,
+    lamps: Records[Lamp],
+    rim: Rim,
+    projection: Projection,
+    places: HaloPlaces,
+    whole: Array,
 ) -> None:
     offset = np.empty(3)
     for i in range(len(lamps)):
@@ -145,13 +208,23 @@ def _fill(
             total = 0.0
         arrival.range_m, arrival.scattering_depth = r, lamp.scattering_per_m * r
         arrival.core_w_m2 = total * math.exp(-arrival.scattering_depth)
-        arrival.halo_w_m2 = total - arrival.core_w_m2
+        row, weight = _place(arrival.scattering_depth, places)
+        row += lamp.halo_row
+        arrival.halo_row, arrival.halo_weight = row, weight
+        arrival.halo_w_m2 = (total - arrival.core_w_m2) * (whole[row] + weight * (whole[row + 1] - whole[row]))
         ray = arrival.ray_camera
         for k in range(3):
             ray[k] = 0.0
             for axis in range(3):
                 ray[k] += offset[axis] / r * T_station_camera[axis, k]
         arrival.pixel[0], arrival.pixel[1], arrival.inside = _locate(ray[0], ray[1], ray[2], projection)
+
+
+@compiled
+def _place(br: float, places: HaloPlaces) -> tuple[int, float]:
+    place = min(math.log(1.0 + br / places.bend) * places.per_log, places.last)
+    row = min(int(place), int(places.last) - 1)
+    return row, place - row
 
 
 @compiled

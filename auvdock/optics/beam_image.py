@@ -20,7 +20,6 @@ from auvdock.optics.beam_pieces import BeamPieces, PieceLight
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.view import Beam
-from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeamImage"]
 
@@ -35,7 +34,7 @@ _NOTHING = 0.02
 class BeamImage:
     """The beam of one rotating beacon on one camera's sensor."""
 
-    def __init__(self, lens: Lens, lights: LightSet, lamp: int, water: WaterCfg) -> None:
+    def __init__(self, lens: Lens, lights: LightSet, lamp: int) -> None:
         """Precompute rays and the angles at which the pieces' tables are made."""
         self._shape = lens.shape
         # Tables are read at the fourth root of the squared chord: fine near the centre, wide outside.
@@ -43,7 +42,8 @@ class BeamImage:
         index = np.arange(_ENTRIES) / float(self._scale)
         self._angle2 = (2.0 * np.arcsin(np.minimum(index**2 / 2.0, 1.0))) ** 2
         self._least_rad = 0.7 * lens.factor * lens.rad_per_px
-        self._pieces = BeamPieces(water, 2.0 * self._least_rad)
+        first_row = int(lights.lamps["halo_row"][lamp])
+        self._pieces = BeamPieces(lights.halo, first_row, 2.0 * self._least_rad)
         rays = lens.rays.astype(np.float32)
         self._rays = np.ascontiguousarray(rays.T)
         self._few_shape = (-(-lens.shape[0] // 2), -(-lens.shape[1] // 2))

@@ -17,9 +17,8 @@ import numpy as np
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import LEAST_EXPONENT
-from auvdock.optics.halo import halo_of
+from auvdock.optics.halo import HALO_ROWS, HaloTable
 from auvdock.optics.view import Beam
-from auvdock.optics.water import WaterCfg
 
 __all__ = ["BeamPieces", "PieceLight"]
 
@@ -48,33 +47,36 @@ class PieceLight(NamedTuple):
 
 
 class BeamPieces:
-    """Tables of one water."""
+    """Tables of one lamp in one water."""
 
-    def __init__(self, water: WaterCfg, least_rad: float) -> None:
+    def __init__(self, halo: HaloTable, first_row: int, least_rad: float) -> None:
         """Tabulate the halo.
 
         Args:
-            water: gives the halo.
+            halo: of the water.
+            first_row: of the lamp's wavelength there.
             least_rad: least size of a piece's Gaussian.
         """
-        self._table = halo_of(water)
+        self._halo, self._first_row = halo, first_row
+        own = slice(first_row, first_row + HALO_ROWS)
         self._first, self._last = math.log(_FIRST_RAD), math.log(math.pi)
         self._per_step = (_ANGLES - 1) / (self._last - self._first)
         grid = np.exp(np.linspace(self._first, self._last, _ANGLES))
-        self._log_rows = np.log(self._table.density_rows(grid))
-        self._encircled = self._table.encircled_rows(grid)
+        self._log_rows = np.log(np.maximum(halo.density_rows(grid)[own].astype(np.float64), 1e-30))
+        self._encircled = halo.encircled_rows(grid)[own]
         self._least_rad = least_rad
 
     def light(self, beam: Beam) -> PieceLight:
         """How the pieces' light divides."""
         length = _FILL * np.diff(beam.edge_rad)
         size = np.hypot(np.maximum(length, self._least_rad), beam.width_rad)
-        row, weight = self._table.row_of(beam.scattering_depth)
+        row, weight = self._halo.row_of(beam.scattering_depth, 0)
         column, right = self._place(0.5 * np.log(np.minimum(size, math.pi) ** 2))
         low = self._encircled[row, column] * (1.0 - right) + self._encircled[row, column + 1] * right
         high = self._encircled[row + 1, column] * (1.0 - right) + self._encircled[row + 1, column + 1] * right
         within = low * (1.0 - weight) + high * weight
-        scattered = self._table.scattered(beam.scattering_depth)
+        scattered = self._halo.scattered(beam.scattering_depth, self._first_row)
+        scattered = scattered / (scattered + np.exp(-beam.scattering_depth))
         ribbon = (1.0 - scattered) / (1.0 + (beam.width_rad / length) ** 4)
         blob = 1.0 - scattered - ribbon + scattered * within**2
         rows = self._log_rows[row] * (1.0 - weight[:, None]) + self._log_rows[row + 1] * weight[:, None]

@@ -35,26 +35,29 @@ class FlashOptics:
     def __init__(self, lit: LitScene) -> None:
         """Tabulate the halo of the pieces."""
         self._lit = lit
-        self._pieces = BeamPieces(lit.water, 1.4 * lit.lens.factor * lit.lens.rad_per_px)
+        self._pieces: BeamPieces | None = None
+        if lit.rotating is not None:
+            least_rad = 1.4 * lit.lens.factor * lit.lens.rad_per_px
+            self._pieces = BeamPieces(lit.lights.halo, lit.rotating.halo_row, least_rad)
 
     def spots(self, view: View) -> Spots:
         """Profiles of the lights in view, the beam counted to its lamp."""
         spots = self._lit.spots.spread(view.arrivals, view.inside)
-        rotating, beam = self._lit.rotating, view.beam
-        if rotating is None or beam is None:
+        rotating, beam, pieces = self._lit.rotating, view.beam, self._pieces
+        if rotating is None or beam is None or pieces is None:
             return spots
         place = np.flatnonzero(spots.rows["lamp"] == rotating.lamp)
         if len(place) == 0:
             return spots
-        flash = self._lines(spots, int(place[0]), beam)
+        flash = self._lines(spots, int(place[0]), beam, pieces)
         # As a spot among others: the mean of the four directions.
         profile, lines = spots.profile.copy(), flash.lines
         profile[flash.place] = 0.25 * (lines[0] + lines[1]) + 0.5 * lines[2]
         return spots._replace(profile=profile, flash=flash)
 
-    def _lines(self, spots: Spots, k: int, beam: Beam) -> FlashLines:
+    def _lines(self, spots: Spots, k: int, beam: Beam, tables: BeamPieces) -> FlashLines:
         rad_per_px, radii = self._lit.lens.rad_per_px, self._lit.spots.radii_px
-        pieces = self._pieces.light(beam)
+        pieces = tables.light(beam)
         gauss = pieces.blob + pieces.ribbon
         light = beam.light_w_m2 * rad_per_px**2
         phi_px = 0.5 * (beam.edge_rad[1:] + beam.edge_rad[:-1])[:, None] / rad_per_px
@@ -63,7 +66,7 @@ class FlashOptics:
         def level(along_px: Array, across_px: Array, blur_px: float) -> Array:
             """Irradiance per pixel at offsets (n,) from the lamp."""
             across2 = across_px * across_px
-            beside = light @ self._pieces.per_sr(pieces, ((along_px - phi_px) ** 2 + across2) * rad_per_px**2, gauss)
+            beside = light @ tables.per_sr(pieces, ((along_px - phi_px) ** 2 + across2) * rad_per_px**2, gauss)
             own2 = along_px * along_px + across2 + blur_px**2
             return beside + np.exp(np.interp(0.5 * np.log(own2), log_radii, log_lamp))
 

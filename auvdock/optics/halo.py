@@ -1,137 +1,207 @@
-"""The halo: small-angle scattering point spread function of Wells (1973).
+"""The halo: how much light of a lamp arrives scattered, and from where, in one water.
 
-Whoever asks how much scattered light arrives, and from where, asks `halo_of`: renderer, `beacons` fidelity, rotating
-beacon and planners. Only that it holds 1 - e^{-b r} of what absorption leaves is known to `optics.arrival` as well.
+Whoever asks for it asks `halo_of`: renderer, `beacons` fidelity, rotating beacon and planners. It comes from the tables
+of single photons (`optics.photons.table`), over b r and angle at the a / b that the water has at a lamp's wavelength. A
+water whose phase function is "wells" has the model of that name (`optics.wells`).
 
-Wells' optical transfer function of a path r is e^{-(a+b) r} e^{b r F(ψ)} with F = (1 - e^{-k}) / k, k = 2π θ0 ψ and ψ
-in cycles per radian. Without its unscattered part it is e^{-a r} × e^{-b r} (e^{b r F} - 1).
-
-F is the mean of e^{-k u} for u uniform on [0, 1], hence e^{-b r} e^{b r F} is the mean of e^{-k S} where S is the sum
-of N such u and N is Poisson distributed with mean b r: N is the number of scattering events, u where on the path each
-of them happened. And e^{-2π θ0 S ψ} is the transform of s / (2π (θ² + s²)^{3/2}) with s = θ0 S. So the Hankel transform
-of Wells' function is a mixture of that kernel over the distribution of S, with no oscillating integral; the single
-scattering term (N = 1), which has a cusp 1/θ, is in closed form. As a function of θ / θ0 it depends on b r alone.
+A table holds a block of rows for each wavelength, one below the other, so that a lamp is found by its block's first row
+and its b r. A lamp's halo is I f(θ) e^{-a r} / r² times (1 - e^{-b r}) `whole`, and that times a density over angle.
 """
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from collections.abc import Callable, Sequence
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvdock.core.arrays import Array, IntArray
+from auvdock.numeric.compiled import compiled
 from auvdock.numeric.records import Records
-from auvdock.optics.spread import HaloPlaces, place_in_halo
-from auvdock.optics.water import WaterCfg
+from auvdock.optics.arrival import HaloPlaces, place_in_halo
+from auvdock.optics.photons.phase import load_phase
+from auvdock.optics.photons.table import PhotonHalo, photon_halo_of
+from auvdock.optics.water import WELLS, WaterCfg
+from auvdock.optics.wells import wells_halo
 
-__all__ = ["HaloTable", "halo_of", "halo_table", "wells_transfer"]
+__all__ = ["HALO_ANGLE_RAD", "HALO_ROWS", "HaloTable", "halo_of"]
 
-_ROWS = 72
-_MIN_BR, _MAX_BR = 1e-3, 40.0
-_BINS_PER_UNIT, _BINS = 64, 4096
-_ANGLES = 192
-_MIN_T, _MAX_T = 1e-3, 200.0
+HALO_ROWS = 112
+"""Rows of b r for each wavelength."""
+_BEND_BR, _LAST_BR = 2.0, 60.0
+_LEAST_BR = 1e-5
+HALO_ANGLE_RAD = np.geomspace(1e-5, math.pi / 2.0, 192)
+"""Angles at which the halo is kept."""
+_STEP = math.log(HALO_ANGLE_RAD[1] / HALO_ANGLE_RAD[0])
+_HALF_PI = math.pi / 2.0
+_NOTHING = 1e-30
 
 
-def wells_transfer(br: float, frequency_cycles_rad: Array, theta0_rad: float) -> Array:
-    """Halo's optical transfer function without absorption: e^{-b r} (e^{b r F(ψ)} - 1) (Wells 1973)."""
-    k = 2.0 * math.pi * theta0_rad * np.maximum(frequency_cycles_rad, 1e-12)
-    return math.exp(-br) * np.expm1(br * -np.expm1(-k) / k)
+class _Block(NamedTuple):
+    """Halo of one wavelength over b r (`HALO_ROWS`,) and `HALO_ANGLE_RAD`.
+
+    Attributes:
+        whole: (rows,) light within 90° over 1 - e^{-b r}.
+        density: (rows, angles) halo per steradian, over what lies within 90°.
+        log_within: (rows, angles) logarithm of the share within.
+    """
+
+    whole: Array
+    density: Array
+    log_within: Array
 
 
 class HaloTable:
-    """Halo of unit light (without absorption) over b r and angle, for one θ0.
+    """Halos of one water over b r and angle, of unit light without the loss e^{-a r}, for some wavelengths.
 
-    The whole halo holds 1 - e^{-b r}. Beyond b r = 40 the table is held constant in shape.
+    Rows are even in ln(1 + b r / 2), 112 for b r from 0 to 60, and read linearly: within 2 % of the photons' table for
+    a / b up to 1, and for more wherever absorption leaves e^-40 of the light. Beyond b r = 60 the last row is held, so
+    is a / b beyond 0.01 and 100. Inside 10 µrad the light within an angle goes on as the same power of it, its radiance
+    is held. What arrives from behind a camera, beyond 90° off the lamp, no photon was counted for: it has the radiance (π - θ) / sin θ × 2/π
+    of that at 90°, single scattering by a phase function that is even backwards. `whole` is without it.
 
     Attributes:
-        places: where in the table which b r is, one row.
+        places: where in a block which b r is, one row.
+        whole: (rows,) light within 90° over 1 - e^{-b r}, of all blocks.
     """
 
-    def __init__(self, theta0_rad: float) -> None:
-        """Scale the universal table to an angle."""
-        self.theta0_rad = theta0_rad
-        log_br, self._log_t, self._log_density, self._encircled = _universal()
-        places = HaloPlaces(log_br[0], 1.0 / (log_br[1] - log_br[0]), _MIN_BR, 0.999 * _MAX_BR)
-        self.places: Records[HaloPlaces] = places.packed()
+    def __init__(self, blocks: dict[float, _Block], phase: Callable[[Array], Array]) -> None:
+        """Put blocks below one another.
 
-    def density_rows(self, angle_rad: Array) -> Array:
-        """(rows, m) halo per steradian at fixed angles (m,), one row per tabulated b r; see `row_of`."""
-        t = np.log(np.clip(angle_rad / self.theta0_rad, _MIN_T, _MAX_T))
-        rows = np.exp(np.array([np.interp(t, self._log_t, row) for row in self._log_density]))
-        return rows / self.theta0_rad**2
+        Args:
+            blocks: by wavelength in nm.
+            phase: the water's phase function in 1/sr.
+        """
+        self._first = {nm: HALO_ROWS * k for k, nm in enumerate(blocks)}
+        self.places: Records[HaloPlaces] = HaloPlaces(_BEND_BR, (HALO_ROWS - 1) / _reach(), HALO_ROWS - 1.0).packed()
+        parts = list(blocks.values())
+        self.whole: Array = np.concatenate([block.whole for block in parts])
+        self._density = np.concatenate([block.density for block in parts])
+        self._log_within = np.concatenate([block.log_within for block in parts])
+        self._phase = phase
+
+    def first_row(self, wavelength_nm: float) -> int:
+        """First row of the block of one of the table's wavelengths."""
+        return self._first[wavelength_nm]
+
+    def density_rows(self, angle_rad: Array) -> NDArray[np.float32]:
+        """(rows, m) halo per steradian at fixed angles (m,), over what lies within 90°, of single precision."""
+        behind = np.minimum(np.maximum(angle_rad, _HALF_PI), math.pi - 1e-6)
+        return _blend(self._density, *_place(angle_rad), (math.pi - behind) / np.sin(behind) / _HALF_PI)
 
     def encircled_rows(self, angle_rad: Array) -> Array:
-        """(rows, m) halo within a cone of half angle (m,), one row per tabulated b r."""
-        t = np.log(np.clip(angle_rad / self.theta0_rad, _MIN_T, _MAX_T))
-        return np.array([np.interp(t, self._log_t, row) for row in self._encircled])
+        """(rows, m) share of what lies within 90° that lies within half angles (m,) above 0."""
+        column, weight = _place(angle_rad)
+        power = (self._log_within[:, 1:2] - self._log_within[:, :1]) / _STEP
+        below = np.minimum(np.log(angle_rad / HALO_ANGLE_RAD[0]), 0.0)
+        rows = self._log_within[:, column] * (1.0 - weight) + self._log_within[:, column + 1] * weight
+        return np.exp(rows + power * below)
 
-    def scattered(self, br: Array) -> Array:
-        """(n,) the whole halo at b r (n,): 1 - e^{-b r}."""
-        return -np.expm1(-br)
+    def row_of(self, br: Array, first_row: int) -> tuple[IntArray, Array]:
+        """Row (n,) below each b r (n,) in a block and the weight (n,) of the row above."""
+        row, weight = place_in_halo(br, self.places)
+        return row + first_row, weight
 
-    def transfer(self, br: float, frequency_cycles_rad: Array) -> tuple[Array, Array]:
-        """Optical transfer function (m,) at frequencies (m,), and its derivative by the frequency."""
-        k = 2.0 * math.pi * self.theta0_rad * frequency_cycles_rad
-        mean = -np.expm1(-k) / k
-        slope = (
-            2.0 * math.pi * self.theta0_rad * br * np.exp(br * (mean - 1.0)) * (k * np.exp(-k) + np.expm1(-k)) / k**2
-        )
-        return wells_transfer(br, frequency_cycles_rad, self.theta0_rad), slope
+    def scattered(self, br: Array, first_row: int) -> Array:
+        """(n,) all light within 90° at b r (n,)."""
+        return self._read(self.whole, br, first_row) * -np.expm1(-br)
 
-    def row_of(self, br: Array) -> tuple[IntArray, Array]:
-        """Row (n,) below each b r (n,) and the weight (n,) of the row above: linear in log b r."""
-        return place_in_halo(br, self.places)
+    def median_rad(self, br: Array, first_row: int) -> Array:
+        """(n,) angle within which half of that light lies."""
+        return np.exp(self._read(self._log_medians, br, first_row))
 
-    def density(self, br: float, angle_rad: Array) -> Array:
+    def density(self, br: float, angle_rad: Array, first_row: int = 0) -> Array:
         """(m,) halo per steradian at angles (m,) for one b r."""
-        return self._one(self.density_rows(angle_rad), br)
+        return self._one(self.density_rows(angle_rad), br, first_row)
 
-    def encircled(self, br: float, angle_rad: Array) -> Array:
+    def encircled(self, br: float, angle_rad: Array, first_row: int = 0) -> Array:
         """(m,) halo within half angles (m,) for one b r."""
-        return self._one(self.encircled_rows(angle_rad), br)
+        return self._one(self.encircled_rows(angle_rad), br, first_row)
 
-    def _one(self, rows: Array, br: float) -> Array:
-        row, weight = self.row_of(np.array([br]))
+    def phase_per_sr(self, angle_rad: Array) -> Array:
+        """(m,) the water's phase function in 1/sr at scattering angles (m,) above 0."""
+        return self._phase(angle_rad)
+
+    def block_br(self) -> Array:
+        """(112,) b r of a block's rows; the first stands for 0."""
+        return _rows_br()
+
+    def _one(self, rows: Array | NDArray[np.float32], br: float, first_row: int) -> Array:
+        depth = np.array([br])
+        row, weight = self.row_of(depth, first_row)
         blend = rows[row[0]] * (1.0 - weight[0]) + rows[row[0] + 1] * weight[0]
-        # Rows hold the halo per scattered energy, which itself is known exactly.
-        return blend * -math.expm1(-br)
+        return blend * self.scattered(depth, first_row)
+
+    def _read(self, rows: Array, br: Array, first_row: int) -> Array:
+        row, weight = self.row_of(br, first_row)
+        return rows[row] * (1.0 - weight) + rows[row + 1] * weight
+
+    @cached_property
+    def _log_medians(self) -> Array:
+        """(rows,) logarithm of the angle within which half of the light lies."""
+        log_angle = np.log(HALO_ANGLE_RAD)
+        return np.array([np.interp(math.log(0.5), row, log_angle) for row in self._log_within])
 
 
-def halo_of(water: WaterCfg) -> HaloTable:
-    """The halo in a water."""
-    return halo_table(water.scattering_angle_rad)
+def halo_of(water: WaterCfg, wavelengths_nm: Sequence[float] = (450.0,)) -> HaloTable:
+    """The halos in a water at some wavelengths: a few milliseconds for each, and kept.
+
+    Raises:
+        ConfigError: no halo ships for the water's phase function.
+    """
+    return _halo_of(water, tuple(dict.fromkeys(wavelengths_nm)))
 
 
 @lru_cache(maxsize=16)
-def halo_table(theta0_rad: float) -> HaloTable:
-    """The table for one θ0, made once."""
-    return HaloTable(theta0_rad)
+def _halo_of(water: WaterCfg, wavelengths_nm: tuple[float, ...]) -> HaloTable:
+    if water.phase == WELLS:
+        model = wells_halo(water.scattering_angle_rad)
+        br = _rows_br()
+        block = _block(br, model.encircled(br, HALO_ANGLE_RAD), model.density(br, HALO_ANGLE_RAD))
+        return HaloTable(dict.fromkeys(wavelengths_nm, block), model.phase)
+    halo = photon_halo_of(water)
+    blocks = {nm: _photon_block(halo, water.absorption_at(nm), water.scattering_at(nm)) for nm in wavelengths_nm}
+    return HaloTable(blocks, load_phase(halo.phase).density)
+
+
+def _photon_block(halo: PhotonHalo, a: float, b: float) -> _Block:
+    low, high = np.exp(halo.log_absorption[[0, -1]])
+    ratio, br = float(np.clip(a / b if b > 0.0 else high, low, high)), _rows_br()
+    return _block(br, *halo.read(br, ratio, HALO_ANGLE_RAD))
+
+
+def _block(br: Array, within: Array, density: Array) -> _Block:
+    whole = np.maximum(within[:, -1:], 1e-300)
+    return _Block(whole[:, 0] / -np.expm1(-br), density / whole, np.log(np.maximum(within / whole, _NOTHING)))
+
+
+def _place(angle_rad: Array) -> tuple[IntArray, Array]:
+    """Column (m,) of the table below each angle (m,) and the weight of the one above, by the angle's logarithm."""
+    place = np.log(np.clip(angle_rad, HALO_ANGLE_RAD[0], _HALF_PI) / HALO_ANGLE_RAD[0]) / _STEP
+    column = np.minimum(place.astype(np.int64), len(HALO_ANGLE_RAD) - 2)
+    return column, place - column
+
+
+@compiled
+def _blend(table: Array, column: IntArray, weight: Array, factor: Array) -> NDArray[np.float32]:
+    """(rows, m) a table (rows, angles) between columns (m,) and the next, times a factor (m,)."""
+    blend = np.empty((len(table), len(column)), dtype=np.float32)
+    for row in range(len(table)):
+        line, out = table[row], blend[row]
+        for i in range(len(column)):
+            low, high = line[column[i]], line[column[i] + 1]
+            out[i] = (low + weight[i] * (high - low)) * factor[i]
+    return blend
+
+
+def _reach() -> float:
+    return math.log1p(_LAST_BR / _BEND_BR)
 
 
 @lru_cache(maxsize=1)
-def _universal() -> tuple[Array, Array, Array, Array]:
-    """(log b r, log θ/θ0, log density θ0² per scattered energy, encircled share) for θ0 = 1."""
-    log_br = np.linspace(math.log(_MIN_BR), math.log(_MAX_BR), _ROWS)
-    t = np.exp(np.linspace(math.log(_MIN_T), math.log(_MAX_T), _ANGLES))
-    br = np.exp(log_br)
-
-    uniform = np.zeros(_BINS)
-    uniform[: _BINS_PER_UNIT + 1] = 1.0 / _BINS_PER_UNIT
-    uniform[[0, _BINS_PER_UNIT]] /= 2.0
-    transform = np.fft.rfft(uniform)
-    # Weights of S for N ≥ 2, over the scattered energy 1 - e^{-b r}.
-    many = np.array([np.fft.irfft(np.exp(x * (transform - 1.0)) - math.exp(-x) * (1.0 + x * transform)) for x in br])
-    scattered = -np.expm1(-br)
-    many = np.maximum(many, 0.0) / scattered[:, None]
-    single = br * np.exp(-br) / scattered
-    s = np.arange(_BINS) / _BINS_PER_UNIT
-    s[0] = 0.25 / _BINS_PER_UNIT
-
-    root = np.hypot(t[:, None], s[None, :])
-    density = many @ (s / (2.0 * math.pi * root**3)).T
-    density += single[:, None] * ((1.0 / t - 1.0 / np.hypot(t, 1.0)) / (2.0 * math.pi))
-    encircled = many @ (1.0 - s / root).T
-    encircled += single[:, None] * (t + 1.0 - np.hypot(t, 1.0))
-    return log_br, np.log(t), np.log(density), encircled
+def _rows_br() -> Array:
+    br = _BEND_BR * np.expm1(np.linspace(0.0, _reach(), HALO_ROWS))
+    return np.clip(br, _LEAST_BR, _LAST_BR)

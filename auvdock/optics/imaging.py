@@ -97,9 +97,9 @@ class UnderwaterCamera:
         """Start an episode: new noise, new nuisances, exposure from scratch."""
         self.lit.reset(rng)
         lit = self.lit
-        self._lights = LightsImage(lit.lens, lit.lights, lit.water, lit.spots)
+        self._lights = LightsImage(lit.lens, lit.lights, lit.spots)
         if lit.rotating is not None:
-            self._beam_image = BeamImage(lit.lens, lit.lights, lit.rotating.lamp, lit.water)
+            self._beam_image = BeamImage(lit.lens, lit.lights, lit.rotating.lamp)
         self._sensor.reset(self.lit.sensor_rng)
         self.exposure.reset()
         self._cover.reset()

@@ -2,8 +2,9 @@
 
 A halo is split at a fixed angle into a part that is smooth everywhere and a fine remainder about its centre. The smooth
 parts of all lamps are evaluated together on the coarse grid of `Lens` through one radial table, and enlarged; the
-remainder is added in full resolution on a small patch and scaled so that the patch holds exactly the light that the
-table says. Table and patch share one index, the fourth root of the squared chord: fine near the centre, wide outside.
+remainder, blurred as `SpotModel` has it, is added in full resolution on a small patch and scaled so that the patch
+holds exactly the light that the table says. Table and patch share one index, the fourth root of the squared chord: fine
+near the centre, wide outside.
 """
 
 from __future__ import annotations
@@ -20,11 +21,10 @@ from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.records import Record, Records
 from auvdock.optics.arrival import Arrival
-from auvdock.optics.halo import halo_of
 from auvdock.optics.lens import Lens
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.spots import SpotModel
-from auvdock.optics.water import WaterCfg
+from auvdock.optics.spread import RADII
 
 __all__ = ["LightsImage", "add_spot"]
 
@@ -41,11 +41,13 @@ class _Table(NamedTuple):
     Attributes:
         rows: (h, entries) halo per steradian of unit light.
         inner_angle2: (i,) squared angles of the entries within the split.
+        inner_radius: (i,) place of these entries among the radii of `SpotModel`.
         scale: entries per unit of the fourth root of the squared chord.
     """
 
     rows: NDArray[np.float32]
     inner_angle2: NDArray[np.float32]
+    inner_radius: NDArray[np.float32]
     scale: np.float32
 
 
@@ -82,8 +84,6 @@ class _Fine(Record):
     pixel: Annotated[Array, 2]
     metric: Annotated[Array, 3]
     """`Lens.metric` there."""
-    soft_rad2: float
-    """Squared angle by which the core's blur softens the halo's cusp."""
     sigma_px: float
     """Of the core."""
     halo_e: Annotated[NDArray[np.float32], 3]
@@ -95,14 +95,13 @@ class _Fine(Record):
 class LightsImage:
     """Cores and halos of a set of lamps on one camera's sensor."""
 
-    def __init__(self, lens: Lens, lights: LightSet, water: WaterCfg, spots: SpotModel) -> None:
+    def __init__(self, lens: Lens, lights: LightSet, spots: SpotModel) -> None:
         """Tabulate the halo on the shared index."""
         self._lens, self._spots = lens, spots
         scale = np.float32((_ENTRIES - 1) / _ROOT_2)
         index = np.arange(_ENTRIES) / float(scale)
         angle = np.maximum(2.0 * np.arcsin(np.minimum(index**2 / 2.0, 1.0)), 1e-7)
-        table = halo_of(water)
-        self._halo = table
+        table = lights.halo
         split_px = _SPLIT_COARSE_PX * lens.factor
         self._split_px = split_px
         self.reach_px = float(split_px)
@@ -111,8 +110,11 @@ class LightsImage:
         self._inner_rows = table.density_rows(inner)
         self._encircled = table.encircled_rows(inner[:1])[:, 0]
         last = int(math.sqrt(2.0 * math.sin(self._split_rad / 2.0)) * float(scale))
-        rows, inner_angle2 = table.density_rows(angle).astype(np.float32), (angle[: last + 1] ** 2).astype(np.float32)
-        self._table = _Table(rows, inner_angle2, scale)
+        rows, inner_angle = table.density_rows(angle), angle[: last + 1]
+        per_radius = math.log(spots.radii_px[1] / spots.radii_px[0])
+        place = np.log(inner_angle / lens.rad_per_px / spots.radii_px[0]) / per_radius
+        place = np.clip(place, 0.0, RADII - 1.001).astype(np.float32)
+        self._table = _Table(rows, (inner_angle**2).astype(np.float32), place, scale)
         self._rays = np.ascontiguousarray(lens.rays.T, dtype=np.float32)
         self._coarse_solid_angle = lens.solid_angle_sr.ravel().astype(np.float32)
         self._channel = lights.column("electrons_per_j") * lens.aperture_m2
@@ -152,14 +154,14 @@ class LightsImage:
         colour = self._channel[index] * exposure_s
         lamps["halo"], lamps["pixel"], lamps["sigma_px"] = halos, pixels[index], sigma
         lamps["metric"] = self._lens.metric_at(np.rint(pixels[index]))
-        lamps["soft_rad2"] = 1.5 * sigma**2 * self._lens.rad_per_px**2
         lamps["halo_e"] = colour * (arrivals["halo_w_m2"][index] * inside)[:, None]
         lamps["core_e"] = colour * arrivals["core_w_m2"][index, None]
-        _add_lights(image, lamps, self._table, self._split_px)
+        profiles = self._spots.halo_profiles(arrivals[index]) / self._lens.rad_per_px**2
+        _add_lights(image, lamps, profiles.astype(np.float32), self._table, self._split_px)
 
     def _halos(self, arrivals: Records[Arrival], index: IntArray) -> Records[_Halo]:
         """The halos of lamps `index` (m,)."""
-        row, weight = self._halo.row_of(arrivals["scattering_depth"][index])
+        row, weight = arrivals["halo_row"][index], arrivals["halo_weight"][index]
         ends = self._inner_rows[row] * (1.0 - weight[:, None]) + self._inner_rows[row + 1] * weight[:, None]
         slope = (ends[:, 2] - ends[:, 1]) / (0.06 * self._split_rad)
         curve = slope / (2.0 * self._split_rad)
@@ -180,7 +182,7 @@ def _add_smooth(
     radiance: NDArray[np.float32], grid: NDArray[np.float32], lamps: Records[_Smooth], table: _Table
 ) -> None:
     """Add the smooth parts of lamps (m,) to radiance (colours, n) at a grid of rays (3, n)."""
-    rows, inner_angle2, scale = table
+    rows, inner_angle2, _, scale = table
     inner, count, entries = len(inner_angle2), grid.shape[1], rows.shape[1]
     density = np.empty(entries, dtype=np.float32)
     entry = np.empty(count, dtype=np.int32)
@@ -202,18 +204,22 @@ def _add_smooth(
 
 
 @compiled
-def _add_lights(image: NDArray[np.float32], lamps: Records[_Fine], table: _Table, reach: int) -> None:
-    """Add to an image lamps (m,): halos above their smooth parts, within `reach` pixels, and cores."""
-    rows, inner_angle2, scale = table
+def _add_lights(
+    image: NDArray[np.float32], lamps: Records[_Fine], profiles: NDArray[np.float32], table: _Table, reach: int
+) -> None:
+    """Add to an image lamps (m,): halos (m, k) above their smooth parts, within `reach` pixels, and cores."""
+    _, inner_angle2, inner_radius, scale = table
     remainder = np.zeros(len(inner_angle2) + 1, dtype=np.float32)
     for k in range(len(lamps)):
         lamp, halo = lamps[k], lamps[k].halo
         if max(lamp.halo_e.max(), lamp.core_e.max()) < _LEAST_E:
             continue
-        low, high, share = rows[halo.row], rows[halo.row + 1], np.float32(halo.weight)
-        level, curve = np.float32(halo.level), np.float32(halo.curve)
+        level, curve, profile = np.float32(halo.level), np.float32(halo.curve), profiles[k]
         for i in range(len(inner_angle2)):
-            remainder[i] = low[i] + share * (high[i] - low[i]) - (level + curve * inner_angle2[i])
+            place = int(inner_radius[i])
+            share = inner_radius[i] - np.float32(place)
+            light = profile[place] + share * (profile[place + 1] - profile[place])
+            remainder[i] = light - (level + curve * inner_angle2[i])
         _add_remainder(image, lamp, remainder, scale, reach)
         _add_gaussian(image, lamp.pixel, lamp.sigma_px, lamp.core_e)
 
@@ -235,7 +241,7 @@ def _add_remainder(
     total = 0.0
     for j in range(side):
         dy = np.float32(top + j - y)
-        along, least = g12 * dy, g22 * dy * dy + np.float32(lamp.soft_rad2)
+        along, least = g12 * dy, g22 * dy * dy
         for i in range(side):
             entry[i] = np.int32(np.sqrt(np.sqrt(across[i] * (g11 * across[i] + along) + least)) * scale)
         line = np.float32(0.0)

@@ -15,6 +15,7 @@ from auvdock.core.beacons import BeaconCfg, BeaconLayout
 from auvdock.numeric.records import Records
 from auvdock.optics.arrival import Arrival, Lamp, Projection, Rim, arrive, arrive_everywhere
 from auvdock.optics.bands import electrons_per_joule
+from auvdock.optics.halo import HaloTable, halo_of
 from auvdock.optics.light import peak_intensity_w_sr
 from auvdock.optics.water import WaterCfg
 
@@ -68,6 +69,10 @@ class LightSet:
         lamps["electrons_per_j"] = [electrons_per_joule(beacon.wavelength_nm) for beacon in beacons]
         setback, lateral = rim_x - lamps["place_m"][:, 0], lamps["place_m"][:, 1:] - rim_centre
         inside = (setback > 0.05) & (np.sum(lateral**2, axis=1) < rim_radius2)
+        nm = [beacon.wavelength_nm for beacon in beacons]
+        self.halo: HaloTable = halo_of(water, nm)
+        """Of the lamps' light in this water."""
+        lamps["halo_row"] = [self.halo.first_row(one) for one in nm]
         lamps["recessed"] = inside & funnel & (np.arange(self.count) < self.station_count)
         if dark is not None:
             lamps["peak_w_sr"][dark] = 0.0
@@ -79,8 +84,9 @@ class LightSet:
 
     def arrive(self, T_station_camera: Array, projection: Records[Projection]) -> Records[Arrival]:
         """(n,) the light of every lamp at a camera pose (4, 4), through a lens (`Lens.projection`)."""
-        return arrive(T_station_camera, self.lamps, self.rim, projection)
+        return arrive(T_station_camera, self.lamps, self.rim, projection, self.halo.places, self.halo.whole)
 
     def arrive_everywhere(self, T_station_camera: Array, projection: Records[Projection]) -> Records[Arrival]:
         """(m n,) the same at many poses (m, 4, 4), pose by pose."""
-        return arrive_everywhere(T_station_camera, self.lamps, self.rim, projection)
+        halo = self.halo
+        return arrive_everywhere(T_station_camera, self.lamps, self.rim, projection, halo.places, halo.whole)

@@ -146,8 +146,8 @@ class LitScene:
         self.lights = LightSet(setup.layout, self.water, extra, funnel=setup.seen_from == "front", dark=dark)
         if setup.rotating is not None:
             image = self.lights.count - 1 if images else None
-            self.rotating = RotatingLight(setup.rotating, self.lights, self.water, fixed, image)
-        self.spots = SpotModel(self.lens, self.lights, self.water, setup.imaging)
+            self.rotating = RotatingLight(setup.rotating, self.lights, fixed, image)
+        self.spots = SpotModel(self.lens, self.lights, setup.imaging)
 
     def _strangers(self, rng: np.random.Generator) -> tuple[BeaconCfg, ...]:
         level = self.setup.nuisance.interference_level

@@ -10,16 +10,19 @@ import numpy as np
 from auvdock.core.arrays import Array, BoolArray
 from auvdock.numeric.records import Records
 from auvdock.optics.arrival import Arrival
-from auvdock.optics.halo import halo_of
+from auvdock.optics.blur import blurred_halo
 from auvdock.optics.lens import Lens
 from auvdock.optics.meeting import Candidate, level_at, meet, saturate
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.sensor import SensorScale
 from auvdock.optics.settings import ImagingCfg
-from auvdock.optics.spread import RADII, HaloPlaces, Spot, SpreadLaw, profiles, spread
-from auvdock.optics.water import WaterCfg
+from auvdock.optics.spread import BLURS, RADII, Spot, SpreadLaw, halo_profiles, profiles, spread
 
 __all__ = ["FlashLines", "SpotModel", "Spots"]
+
+
+_NEAR_M = 0.3
+"""Nearer than this a lamp's halo is blurred no more."""
 
 
 class FlashLines(NamedTuple):
@@ -56,7 +59,7 @@ class SpotModel:
     """Spreads core and halo over the sensor, radially symmetric about each light.
 
     The core is a Gaussian: the lens' point spread function widened by the lamp's face, σ² = σ_lens² + (R / (2 r) f)²
-    (a uniform disc of radius R has variance R²/4 per axis).
+    (a uniform disc of radius R has variance R²/4 per axis). The halo is blurred as much (`optics.blur`).
 
     Attributes:
         radii_px: (k,) radii at which profiles are tabulated.
@@ -65,35 +68,33 @@ class SpotModel:
         samples: number of the image's samples, three per pixel.
     """
 
-    def __init__(
-        self, lens: Lens, lights: LightSet, water: WaterCfg, cfg: ImagingCfg, smoothing_px2: float = 0.0
-    ) -> None:
+    def __init__(self, lens: Lens, lights: LightSet, cfg: ImagingCfg, smoothing_px2: float = 0.0) -> None:
         """Tabulate the halo at fixed radii.
 
         Args:
             lens: the camera's geometry.
-            lights: the lamps.
-            water: the water between.
+            lights: the lamps in their water.
             cfg: the camera as an instrument.
-            smoothing_px2: variance per axis by which a detector smooths; the cusp of a halo is softened by half as much
-                again as the core.
+            smoothing_px2: variance per axis by which a detector smooths on top.
         """
         self.lights = lights
         radii = np.geomspace(0.35, 0.45 * lens.camera.width_px, RADII)
         edges = np.concatenate([[0.0], np.sqrt(radii[1:] * radii[:-1]), radii[-1:]])
         self.radii_px: Array = radii
         self.ring_px2: Array = math.pi * np.diff(edges**2)
-        table, lens_px2 = halo_of(water), cfg.lens_sigma_px**2
-        seen_px = np.sqrt(radii**2 + 1.5 * (lens_px2 + smoothing_px2)) if smoothing_px2 > 0.0 else radii
-        self._halo = table.density_rows(seen_px * lens.rad_per_px) * lens.rad_per_px**2
+        least_px2 = cfg.lens_sigma_px**2 + smoothing_px2
+        face_px2_m2 = (cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2
+        spans = math.log1p(face_px2_m2 / _NEAR_M**2 / least_px2)
+        blurs_px2 = least_px2 * np.exp(np.linspace(0.0, spans, BLURS))
+        self._halo = blurred_halo(lights.halo, radii, lens.rad_per_px, blurs_px2)
         self.law: Records[SpreadLaw] = SpreadLaw(
-            halo=HaloPlaces.read(table.places),
-            lens_px2=lens_px2 + smoothing_px2,
-            face_px2_m2=(cfg.lamp_radius_m / 2.0 / lens.rad_per_px) ** 2,
+            lens_px2=least_px2,
+            face_px2_m2=face_px2_m2,
             aperture_m2=lens.aperture_m2,
             radius_px=radii,
             ring_px2=self.ring_px2,
             per_log_px2=0.5 / math.log(radii[1] / radii[0]),
+            blurs_per_log=(BLURS - 1) / spans if spans > 0.0 else 0.0,
         ).packed()
         self._core_px2, self._face_px2_m2 = self.law["lens_px2"].item(), self.law["face_px2_m2"].item()
         self.samples = lens.camera.width_px * lens.camera.height_px * 3
@@ -109,6 +110,10 @@ class SpotModel:
     def profiles(self, arrivals: Records[Arrival]) -> Array:
         """(n, k) profiles of lights (n,), 0 for those that are not on the sensor."""
         return profiles(arrivals, self.law, self._halo)
+
+    def halo_profiles(self, arrivals: Records[Arrival]) -> Array:
+        """(n, k) halos of unit light per pixel at `radii_px`, of lights (n,)."""
+        return halo_profiles(arrivals, self.law, self._halo)
 
     def saturated_area_px2(self, spots: Spots, level_e_s: float) -> Array:
         """(m, 3) area of each spot above a level in electrons per second, per channel; overlap is not counted."""

@@ -8,36 +8,24 @@ from typing import Annotated
 
 import numpy as np
 
-from auvdock.core.arrays import Array, BoolArray, IntArray
+from auvdock.core.arrays import Array, BoolArray
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.constants import LEAST_EXPONENT
 from auvdock.numeric.records import Record, Records
 from auvdock.optics.arrival import Arrival, Lamp
 
-__all__ = ["RADII", "HaloPlaces", "Spot", "SpreadLaw", "place_in_halo", "profiles", "spread"]
+__all__ = ["BLURS", "RADII", "Spot", "SpreadLaw", "halo_profiles", "profiles", "spread"]
 
 RADII = 32
 """Radii at which profiles are tabulated."""
-
-
-@dataclass(frozen=True)
-class HaloPlaces(Record):
-    """Where in the halo's table a scattering depth is; the rows are even in its logarithm."""
-
-    log_first: float
-    """Logarithm of the first row's b r."""
-    per_log: float
-    """Rows per unit of ln b r."""
-    least: float
-    greatest: float
-    """b r that the table holds."""
+BLURS = 12
+"""Variances of the blur at which halos are tabulated."""
 
 
 @dataclass(frozen=True)
 class SpreadLaw(Record):
     """What core and halo become on one camera's sensor in one water."""
 
-    halo: HaloPlaces
     lens_px2: float
     """Variance of the core by the lens' point spread function."""
     face_px2_m2: float
@@ -50,6 +38,8 @@ class SpreadLaw(Record):
     """Area of the ring that each radius stands for."""
     per_log_px2: float
     """Tabulated radii per unit of ln r²."""
+    blurs_per_log: float
+    """Tabulated blurs, from `lens_px2` upwards, per unit of the logarithm of the core's variance."""
 
 
 @dataclass
@@ -83,7 +73,7 @@ def spread(
         shown: (n,) which lights.
         lamps: (n,) where it comes from.
         law: one row.
-        halo: (h, k) halo of unit light per pixel at the tabulated radii, by b r.
+        halo: (blurs, h, k) halo of unit light per pixel at the tabulated radii, by the core's variance and b r.
 
     Returns:
         The lights (m,), and their profiles (m, k): irradiance per pixel at those radii, W/m².
@@ -119,14 +109,20 @@ def profiles(arrivals: Records[Arrival], law: Records[SpreadLaw], halo: Array) -
 
 
 @compiled
+def halo_profiles(arrivals: Records[Arrival], law: Records[SpreadLaw], halo: Array) -> Array:
+    """(n, k) halos of unit light per pixel at the tabulated radii, of lights (n,)."""
+    profile = np.empty((len(arrivals), RADII))
+    for i in range(len(arrivals)):
+        _put_halo(profile[i], arrivals[i], 1.0, _variance(arrivals[i], law[0]), law[0], halo)
+    return profile
+
+
+@compiled
 def _put_profile(profile: Array, arrival: Arrival, law: SpreadLaw, halo: Array) -> float:
     """Put a light's profile (k,) there; σ of its core."""
-    row, weight = _place(arrival.scattering_depth, law.halo)
-    sigma2 = law.lens_px2 + law.face_px2_m2 / (arrival.range_m * arrival.range_m)
-    peak = arrival.core_w_m2 / (2.0 * math.pi * sigma2)
-    below, above, light, radius = halo[row], halo[row + 1], arrival.halo_w_m2, law.radius_px
-    for k in range(RADII):
-        profile[k] = (below[k] + weight * (above[k] - below[k])) * light
+    sigma2 = _variance(arrival, law)
+    _put_halo(profile, arrival, arrival.halo_w_m2, sigma2, law, halo)
+    peak, radius = arrival.core_w_m2 / (2.0 * math.pi * sigma2), law.radius_px
     for k in range(RADII):
         exponent = -0.5 * (radius[k] * radius[k]) / sigma2
         if exponent <= LEAST_EXPONENT:
@@ -136,16 +132,20 @@ def _put_profile(profile: Array, arrival: Arrival, law: SpreadLaw, halo: Array) 
 
 
 @compiled
-def place_in_halo(br: Array, places: Records[HaloPlaces]) -> tuple[IntArray, Array]:
-    """Row (n,) of the halo's table below each b r (n,) and the weight (n,) of the row above: linear in ln b r."""
-    row, weight = np.empty(len(br), dtype=np.int64), np.empty(len(br))
-    for i in range(len(br)):
-        row[i], weight[i] = _place(br[i], places[0])
-    return row, weight
+def _put_halo(profile: Array, arrival: Arrival, light: float, sigma2: float, law: SpreadLaw, halo: Array) -> None:
+    """Put the halo of so much light there (k,), blurred as a core of variance `sigma2` is."""
+    place = min(math.log(sigma2 / law.lens_px2) * law.blurs_per_log, BLURS - 1.0)
+    blur, row = min(int(place), BLURS - 2), arrival.halo_row
+    wider, higher = place - blur, arrival.halo_weight
+    at_00, at_01 = (1.0 - wider) * (1.0 - higher) * light, (1.0 - wider) * higher * light
+    at_10, at_11 = wider * (1.0 - higher) * light, wider * higher * light
+    sharp, wide = halo[blur], halo[blur + 1]
+    for k in range(RADII):
+        profile[k] = at_00 * sharp[row, k] + at_01 * sharp[row + 1, k]
+        profile[k] += at_10 * wide[row, k] + at_11 * wide[row + 1, k]
 
 
 @compiled
-def _place(br: float, places: HaloPlaces) -> tuple[int, float]:
-    place = (math.log(min(max(br, places.least), places.greatest)) - places.log_first) * places.per_log
-    row = int(place)
-    return row, place - row
+def _variance(arrival: Arrival, law: SpreadLaw) -> float:
+    """Of the core, px²."""
+    return law.lens_px2 + law.face_px2_m2 / (arrival.range_m * arrival.range_m)

@@ -16,7 +16,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.limits import Count, between
 from auvdock.optics.detection_model import load_detection_model
 from auvdock.optics.settings import ImagingCfg
-from auvdock.optics.water import load_water, with_attenuation
+from auvdock.optics.water import water_of
 from auvdock.planning.detectability import Detectability
 from auvdock.planning.sight import Sight
 from auvdock.planning.voxels import VoxelRegion, fill_region
@@ -80,9 +80,7 @@ def make_detectability(layout: BeaconLayout, cfg: PlanCfg) -> Detectability:
     Raises:
         ConfigError: an unknown water, or more lights wanted than the layout has.
     """
-    water = load_water(cfg.water)
-    if cfg.attenuation_per_m is not None:
-        water = with_attenuation(water, cfg.attenuation_per_m)
+    water = water_of(cfg.water, cfg.attenuation_per_m)
     count = len(layout.indices("array"))
     if cfg.min_lights > count:
         raise ConfigError("min_lights", cfg.min_lights, f"at most {count}, the array's number of lights")

@@ -50,8 +50,8 @@ class Sight:
         self.target_m = layout.array_positions_m.mean(axis=0)
         self.camera, self.imaging = camera, imaging
         self.lens = Lens(camera, imaging)
-        self.spots = SpotModel(self.lens, self.lights, water, imaging)
-        self._smoothed = SpotModel(self.lens, self.lights, water, imaging, SMOOTHING_PX2)
+        self.spots = SpotModel(self.lens, self.lights, imaging)
+        self._smoothed = SpotModel(self.lens, self.lights, imaging, SMOOTHING_PX2)
         self.scale = SensorScale(imaging, 1.0)
         self.channel = self.lights.column("electrons_per_j") * self.lens.aperture_m2
         self.blue = np.flatnonzero(self.channel.argmax(axis=1) == 2)

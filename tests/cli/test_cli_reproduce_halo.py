@@ -39,6 +39,20 @@ def test_attenuation_moves_scattering_alone(capsys):
     assert found["scattering_per_m"] == pytest.approx(0.95)
 
 
+def test_a_turbid_water_and_a_station_have_their_own_phase_functions(capsys):
+    # Petzold (1972): c of his harbour at 530 nm is 1.92 1/m, b is 1.583.
+    words = ("--range", "2", "--wavelength-nm", "530")
+    _, harbour = run_json(capsys, "--water", "petzold_harbour", *words)
+    _, turbid = run_json(capsys, "--turbidity", "1.92", *words)
+    assert harbour["phase_function"] == turbid["phase_function"] == "petzold-harbour"
+    assert harbour["scattering_per_m"] == pytest.approx(1.583, abs=5e-4)
+    assert harbour["core"] == pytest.approx(math.exp(-2 * 1.92))
+    assert turbid["within"] == harbour["within"]
+    _, between = run_json(capsys, "--turbidity", "1", *words)
+    assert between["core"] == pytest.approx(math.exp(-2.0))
+    assert all(share in between["phase_function"] for share in ("*petzold-coastal", "*petzold-harbour"))
+
+
 def test_thin_water_is_single_scattering(capsys):
     _, found = run_json(capsys, "--water", "clear", "--range", "0.2", "--wavelength-nm", "530")
     once = SingleScattering(load_phase("fournier-forand-0.018"))
@@ -68,6 +82,9 @@ def test_a_small_check_says_what_it_could_judge(capsys, tmp_path):
         ["--water", "pool", "--range", "5", "--attenuation", "0.01"],
         ["--water", "pool", "--range", "5", "--attenuation", "0.05"],
         ["--water", "pool", "--range", "5", "--wavelength-nm", "5"],
+        ["--water", "pool", "--range", "5", "--turbidity", "1"],
+        ["--turbidity", "0.1", "--range", "5"],
+        ["--turbidity", "1", "--attenuation", "1", "--range", "5"],
         ["--range", "5"],
         ["--photons", "3"],
         ["--seed", "-1"],

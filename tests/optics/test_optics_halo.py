@@ -1,63 +1,100 @@
-import itertools
+"""The halo that is flown: the photons' tables, read fast, for the wavelengths of a scene's lamps."""
+
+import dataclasses
 import math
 
 import numpy as np
 import pytest
-from scipy.special import j0
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from auvdock.optics.halo import halo_table, wells_transfer
+from auvdock.optics.halo import halo_of
+from auvdock.optics.photons.table import photon_halo_of
+from auvdock.optics.water import WaterCfg, load_water
+from auvdock.optics.wells import wells_halo
 
-BR = [0.01, 0.1, 0.7, 2.0, 5.0, 10.0, 18.0]
-
-
-@pytest.mark.parametrize("br", BR)
-def test_hankel_transform_of_the_table_is_wells_function(br):
-    theta0 = 0.02
-    table = halo_table(theta0)
-    # The tail of small-angle theory runs to infinite angles; 400 θ0 leaves out less than 1 % of it.
-    angle = np.exp(np.linspace(math.log(1e-6), math.log(8.0), 60001))
-    density = table.density(br, np.minimum(angle, 4.0)) * np.where(angle > 4.0, (4.0 / angle) ** 3, 1.0)
-    for psi in (1.0, 4.0, 12.0):
-        weight = density * j0(2.0 * math.pi * psi * angle) * 2.0 * math.pi * angle
-        transform = float(np.trapezoid(weight, angle))
-        expected = float(wells_transfer(br, np.array([psi]), theta0)[0])
-        assert transform == pytest.approx(expected, abs=0.006 * -math.expm1(-br))
+READ = np.radians([0.02, 0.05, 0.2, 0.35, 1.0, 2.0, 5.0, 13.0, 40.0, 90.0])
+RATIOS = (0.01, 0.05, 0.14, 0.6, 1.0, 5.0)
 
 
-@pytest.mark.parametrize("br", BR)
-def test_halo_and_core_hold_what_is_not_absorbed(br):
-    encircled = float(halo_table(0.02).encircled(br, np.array([4.0]))[0])
-    # At 4 rad a single scattering has θ0 / 4 of its light left to come, several that many times more.
-    missing = 0.02 * max(br, 1.0) / (2.0 * 4.0)
-    assert encircled + math.exp(-br) + missing * -math.expm1(-br) == pytest.approx(1.0, abs=0.02)
+def water_of(ratio, b=0.2):
+    return WaterCfg("test", "test", (ratio * b,) * 3, (b,) * 3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(-7.0, math.log(59.9)), st.sampled_from(RATIOS))
+def test_light_within_an_angle_is_the_photons(log_br, ratio):
+    """Within 2 %, at whatever b r, as long as absorption leaves anything; radiance within 4 % then."""
+    br = math.exp(log_br)
+    if br * ratio > 40.0:
+        return
+    water = water_of(ratio)
+    table, photons = halo_of(water), photon_halo_of(water)
+    assert table.encircled(br, READ) == pytest.approx(photons.within(br, ratio, READ), rel=0.02)
+    assert table.density(br, READ[:-1]) == pytest.approx(photons.radiance(br, ratio, READ[:-1]), rel=0.04)
 
 
 @pytest.mark.parametrize("br", [0.3, 3.0, 12.0])
 def test_density_is_the_derivative_of_encircled_light(br):
-    table = halo_table(0.05)
-    edges = np.geomspace(0.01, 1.0, 30)
+    table = halo_of(load_water("pool"))
+    edges = np.geomspace(1e-4, 1.5, 40)
     rings = np.diff(table.encircled(br, edges))
     for ring, low, high in zip(rings, edges, edges[1:], strict=False):
         angle = np.linspace(low, high, 200)
-        inside = float(np.trapezoid(table.density(br, angle) * 2.0 * math.pi * angle, angle))
-        assert ring == pytest.approx(inside, rel=0.02)
+        inside = float(np.trapezoid(table.density(br, angle) * 2.0 * math.pi * np.sin(angle), angle))
+        assert ring == pytest.approx(inside, rel=0.03)
 
 
-def half_width_deg(range_m: float, pixel_deg: float) -> float:
-    """Half width of the halo as a camera with such a pixel resolves it."""
-    angle = np.radians(np.linspace(pixel_deg / 2.0, 20.0, 20000))
-    density = halo_table(0.02).density(0.35 * range_m, angle)
-    return float(np.degrees(angle[np.argmax(density < density[0] / 2.0)]))
+def test_each_wavelength_has_its_own_absorption_and_scattering():
+    water = load_water("lake")
+    table, photons = halo_of(water, (450.0, 530.0, 450.0)), photon_halo_of(water)
+    assert table.first_row(450.0) != table.first_row(530.0)
+    for nm in (450.0, 530.0):
+        ratio = water.absorption_at(nm) / water.scattering_at(nm)
+        read = table.encircled(4.0, READ, table.first_row(nm))
+        assert read == pytest.approx(photons.within(4.0, ratio, READ), rel=0.02)
+    assert halo_of(water, (450.0, 530.0)) is table
 
 
-def test_half_width_grows_with_range():
-    widths = [half_width_deg(r, 0.1) for r in (6.0, 15.0, 25.0, 35.0, 45.0)]
-    assert all(low < high for low, high in itertools.pairwise(widths))
-    assert half_width_deg(6.0, 0.1) == pytest.approx(0.1, abs=0.05)
-    assert half_width_deg(35.0, 0.1) == pytest.approx(3.0, abs=0.5)
+def test_beyond_the_table_the_last_reading_is_held():
+    table = halo_of(load_water("pool"))
+    assert np.array_equal(table.encircled(1e4, READ), table.encircled(60.0, READ))
+    far, farther = halo_of(water_of(200.0, 0.05)), halo_of(water_of(1000.0, 0.05))
+    assert np.array_equal(far.encircled(0.05, READ), farther.encircled(0.05, READ))
+    thin, thinner = halo_of(water_of(0.01)), halo_of(water_of(0.001))
+    assert thin.encircled(2.0, READ) == pytest.approx(thinner.encircled(2.0, READ))
 
 
-def test_table_scales_with_the_scattering_angle():
-    angle = np.array([0.003, 0.02, 0.1])
-    narrow, wide = halo_table(0.02).density(2.0, angle), halo_table(0.04).density(2.0, 2.0 * angle)
-    assert narrow == pytest.approx(4.0 * wide, rel=1e-3)
+def test_water_that_does_not_scatter_has_no_halo():
+    table = halo_of(dataclasses.replace(load_water("pool"), scattering_per_m=(0.0, 0.0, 0.0)))
+    assert np.all(table.scattered(np.zeros(3), 0) == 0.0)
+    assert np.all(np.isfinite(table.density_rows(READ)))
+
+
+def test_no_light_is_counted_from_behind_but_some_is_seen():
+    """Radiance goes on beyond 90° without a step and falls; the whole is what lies within 90°."""
+    table, angle = halo_of(load_water("pool")), np.radians([89.0, 91.0, 120.0, 150.0, 180.0])
+    radiance = table.density(7.0, angle)
+    assert radiance[1] == pytest.approx(radiance[0], rel=0.03)
+    assert np.all(np.diff(radiance) < 0.0)
+    assert radiance[-1] == pytest.approx(radiance[0] * 2.0 / math.pi, rel=0.03)
+    assert table.encircled(7.0, np.array([math.pi])) == pytest.approx(table.scattered(np.array([7.0]), 0))
+
+
+def test_median_angle_holds_half_of_the_light_and_grows_with_scattering():
+    table, depths = halo_of(load_water("pool")), np.array([0.1, 1.0, 3.5, 7.0, 15.0])
+    medians = table.median_rad(depths, 0)
+    assert np.all(np.diff(medians) > 0.0)
+    for br, median in zip(depths.tolist(), medians.tolist(), strict=True):
+        assert table.encircled(br, np.array([median]))[0] == pytest.approx(
+            0.5 * table.scattered(np.array([br]), 0)[0], rel=0.02
+        )
+
+
+def test_a_water_can_name_wells_model():
+    water = dataclasses.replace(load_water("pool"), phase_function="wells", scattering_angle_rad=0.031)
+    table, model = halo_of(water), wells_halo(0.031)
+    for br in (0.5, 3.5, 15.0):
+        expected = model.encircled(np.array([br]), READ)[0]
+        assert table.encircled(br, READ) == pytest.approx(expected, rel=0.02)
+    assert table.phase_per_sr(READ) == pytest.approx(model.phase(READ))

@@ -1,4 +1,3 @@
-import dataclasses
 import math
 
 import cv2
@@ -8,8 +7,9 @@ from optics_scene import T_WORLD_STATION, fixed_exposure, imager, one_lamp, pose
 
 from auvdock.core.beacons import BeaconLayout
 from auvdock.core.transforms import invert
-from auvdock.optics.halo import halo_table
-from auvdock.optics.water import WaterCfg, load_water
+from auvdock.optics.halo import halo_of
+from auvdock.optics.photons.table import photon_halo_of
+from auvdock.optics.water import WaterCfg, load_water, with_attenuation
 
 NO_SCATTER = WaterCfg("absorbing", "test", (0.1, 0.2, 0.4), (0.0, 0.0, 0.0))
 
@@ -50,27 +50,45 @@ def test_image_holds_the_light_that_falls_within_it(size, r):
     # What a halo sends past the image is integrated over the coarse grid's complement.
     corner = lens.rays.reshape(*lens.shape, 3)
     angle = np.arccos(np.clip(corner @ arrivals["ray_camera"][-1], -1.0, 1.0))
-    density = halo_table(0.02).density(float(arrivals["scattering_depth"][-1]), np.maximum(angle, 0.05))
+    table, depth = unit.lit.lights.halo, float(arrivals["scattering_depth"][-1])
+    density = table.density(depth, np.maximum(angle, 0.05).ravel()).reshape(angle.shape)
     tail = density * lens.solid_angle_sr * lens.factor**2
     outside_core = float(tail[angle > 0.05].sum())
-    inside_core = float(halo_table(0.02).encircled(float(arrivals["scattering_depth"][-1]), np.array([0.05]))[0])
-    share = -math.expm1(-float(arrivals["scattering_depth"][-1]))
+    inside_core = float(table.encircled(depth, np.array([0.05]))[0])
+    share = float(table.scattered(np.array([depth]), 0)[0])
     expected = arrivals["core_w_m2"][-1] + arrivals["halo_w_m2"][-1] * (inside_core + outside_core) / share
     assert view.inside[-1]
     assert image[:, :, 2].sum() == pytest.approx(expected * channel[2], rel=0.02)
     assert image[:, :, 2].sum() < 1.0001 * whole
 
 
-def test_halo_and_core_hold_what_absorption_leaves():
-    # Little absorbing, so that the loss over all is e^{-a r}; a narrow halo, so that it fits in the image.
-    water = WaterCfg("narrow", "test", (0.05, 0.05, 0.05), (0.2, 0.2, 0.2), scattering_angle_rad=0.002)
-    r = 10.0
-    unit, bare = (
-        imager(one_lamp(), water),
-        imager(one_lamp(), dataclasses.replace(NO_SCATTER, absorption_per_m=(0, 0, 0))),
-    )
-    ratio = electrons(unit, pose(r))[0].sum() / electrons(bare, pose(r))[0].sum()
-    assert ratio == pytest.approx(math.exp(-0.05 * r), rel=0.02)
+@pytest.mark.parametrize(
+    ("name", "attenuation", "r"),
+    [("clear", None, 10.0), ("pool", None, 10.0), ("pool", None, 30.0), ("pool", 1.2, 10.0), ("lake", None, 8.0)],
+)
+def test_picture_and_spots_hold_the_photons_light_within_an_angle(name, attenuation, r):
+    """Of the picture, and of the profile that the `beacons` fidelity and planners take, within 0.5°, 2° and 10°."""
+    water = load_water(name) if attenuation is None else with_attenuation(load_water(name), attenuation)
+    a, b = water.absorption_per_m[0], water.scattering_per_m[0]
+    unit = imager(one_lamp(), water)
+    image, view = electrons(unit, pose(r))
+    lit = unit.lit
+    x, y = np.meshgrid(np.arange(640.0), np.arange(360.0))
+    rays = lit.camera.rays(np.column_stack([x.ravel(), y.ravel()]))
+    angle = np.arccos(np.clip(rays @ view.arrivals["ray_camera"][-1], -1.0, 1.0))
+    per_w = float(lit.lights.lamps["electrons_per_j"][-1, 2]) * lit.lens.aperture_m2 * 1e-3
+    alone = float(lit.lights.lamps["peak_w_sr"][-1]) / r**2
+    spots = lit.spots.spread(view.arrivals, view.inside)
+    rings = np.cumsum(spots.profile[-1] * lit.spots.ring_px2)
+    radii = lit.spots.radii_px
+    edges = np.append(np.sqrt(radii[1:] * radii[:-1]), radii[-1]) * lit.lens.rad_per_px
+    for half in np.radians([0.5, 2.0, 10.0]).tolist():
+        photons = photon_halo_of(water).within(b * r, a / b, np.array([half]))[0]
+        expected = alone * math.exp(-a * r) * (math.exp(-b * r) + photons)
+        # Pixels on the rim count by the share that lies within.
+        rim = np.clip((half - angle) / lit.lens.rad_per_px + 0.5, 0.0, 1.0)
+        assert float(image[:, :, 2].ravel() @ rim) == pytest.approx(expected * per_w, rel=0.05)
+        assert float(np.interp(half, edges, rings)) == pytest.approx(expected, rel=0.05)
 
 
 def test_halo_profile_is_the_tables():
@@ -80,12 +98,12 @@ def test_halo_profile_is_the_tables():
     arrivals, lens = view.arrivals, unit.lit.lens
     x, y = 320, 180
     channel = unit.lit.lights.lamps["electrons_per_j"][-1, 2] * lens.aperture_m2 * 1e-3
+    table, depth = halo_of(water), float(arrivals["scattering_depth"][-1])
+    whole = float(table.scattered(np.array([depth]), 0)[0])
     for offset in (6, 15, 22, 26, 40, 90, 160, 300):
         angle = np.arccos(lens.camera.rays(np.array([[x + offset, y]]).astype(float)) @ arrivals["ray_camera"][-1])
         solid = np.interp(x + offset, (np.arange(160) + 0.5) * 4 - 0.5, lens.solid_angle_sr[45])
-        density = float(halo_table(0.02).density(float(arrivals["scattering_depth"][-1]), angle)[0])
-        expected = arrivals["halo_w_m2"][-1] / -math.expm1(-float(arrivals["scattering_depth"][-1])) * density * solid
-        expected *= -math.expm1(-float(arrivals["scattering_depth"][-1]))
+        expected = arrivals["halo_w_m2"][-1] / whole * float(table.density(depth, angle)[0]) * solid
         assert image[y, x + offset, 2] == pytest.approx(expected * channel, rel=0.08)
 
 

@@ -1,5 +1,6 @@
 """The halo's table: held to fresh photons, to single scattering in thin water, and refused where it ends."""
 
+import dataclasses
 import itertools
 import math
 from functools import lru_cache
@@ -8,13 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.special import j0
 
 from auvdock.assets import asset
 from auvdock.core.errors import ConfigError
 from auvdock.optics.photons.making import ANGLE_RAD, left_after, make_grid, ring_radiance
 from auvdock.optics.photons.phase import load_phase
 from auvdock.optics.photons.single import SingleScattering
-from auvdock.optics.photons.table import halo_names, load_halo, phase_of
+from auvdock.optics.photons.table import halo_names, load_halo, photon_halo_of
 from auvdock.optics.photons.walk import shoot
 from auvdock.optics.water import load_water
 
@@ -104,7 +106,7 @@ def test_radiance_is_the_derivative(br, x):
         assert ring == pytest.approx(outer - inner, rel=2e-3)
 
 
-@pytest.mark.parametrize(("br", "x"), [(61.0, 0.1), (0.0, 0.1), (1.0, 0.009), (1.0, 101.0), (math.nan, 0.1)])
+@pytest.mark.parametrize(("br", "x"), [(61.0, 0.1), (0.0, 0.1), (1.0, 0.009), (1.0, math.inf), (math.nan, 0.1)])
 def test_beyond_the_table_a_reading_is_refused(br, x):
     with pytest.raises(ConfigError):
         load_halo(FORAND).within(br, x, np.array([1.0]))
@@ -127,6 +129,39 @@ def test_far_beyond_the_table_it_goes_on_as_light_does():
         assert read == pytest.approx(within[k, [2, 4]], rel=0.2)
 
 
-@pytest.mark.parametrize("name", ["clear", "pool", "lake", "II", "9C"])
-def test_every_water_has_a_phase_function_whose_halo_ships(name):
-    assert phase_of(load_water(name)) in halo_names()
+@pytest.mark.parametrize("name", ["0.4*petzold-clear+0.6*petzold-coastal", "0.66*petzold-coastal+0.34*petzold-harbour"])
+def test_a_mixtures_halo_is_that_of_photons_in_its_phase_function(name):
+    halo, phase, (facing, solid) = load_halo(name), load_phase(name), ring_radiance(ANGLE_RAD)
+    within = []
+    for rng in np.random.default_rng(5).spawn(10):
+        tally = shoot(phase, 4000, BR, ANGLE_RAD, rng, outer=25.0)
+        crossed = np.einsum("nme,ke->nkm", tally.once + tally.more, left_after(RATIOS)) / tally.photons
+        within.append(np.cumsum(crossed * solid / facing, axis=-1))
+    mean, sigma = np.mean(within, axis=0), np.std(within, axis=0, ddof=1) / math.sqrt(len(within))
+    for i, br in enumerate(BR):
+        for k, x in enumerate(RATIOS):
+            fresh, error = (np.interp(READ, ANGLE_RAD, curve[i, k]) for curve in (mean, sigma))
+            # 5 % for a logarithm that is linear in the shares.
+            assert np.all(np.abs(halo.within(br, x, READ) - fresh) < 5.0 * error + 0.05 * fresh), (br, x)
+
+
+@pytest.mark.parametrize("x", [300.0, 3000.0])
+def test_beyond_the_strongest_absorption_it_goes_on_as_single_scattering_does(x):
+    once, angle = SingleScattering(load_phase(FORAND)), np.radians([0.2, 2.0, 20.0, 80.0])
+    for br in (0.1 / x, 3.0 / x, 20.0 / x):
+        assert load_halo(FORAND).within(br, x, angle) == pytest.approx(once.within(br, x, angle), rel=0.07)
+
+
+@pytest.mark.parametrize("theta0", [0.02, 0.05])
+@pytest.mark.parametrize("br", [0.5, 3.0, 15.0])
+def test_wells_model_has_wells_transfer_function(br, theta0):
+    water = dataclasses.replace(load_water("lake"), phase_function="wells", scattering_angle_rad=theta0)
+    halo = photon_halo_of(water)
+    edges = np.geomspace(1e-4 * theta0, 1.5, 4000)
+    ring = np.diff(halo.within(br, 0.3, edges), prepend=0.0)
+    middle = np.concatenate([[0.5 * edges[0]], np.sqrt(edges[1:] * edges[:-1])])
+    for k in (0.3, 1.2, 6.0):
+        # Wells (1973): of the frequency k / (2π θ0), without absorption and without what is not scattered.
+        expected = math.exp(-br) * math.expm1(br * -math.expm1(-k) / k)
+        assert float(np.sum(ring * j0(k / theta0 * middle))) == pytest.approx(expected, abs=0.01)
+    assert halo.within(br, 0.02, edges[-5:]) == pytest.approx(halo.within(br, 5.0, edges[-5:]))

@@ -5,12 +5,15 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from auvdock.assets import asset
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
 from auvdock.optics.phase_function import fournier_forand
 from auvdock.optics.photons.making import left_after, ring_radiance
+from auvdock.optics.photons.mixture import mixture_name, shares_of
 from auvdock.optics.photons.phase import MeasuredPhase, load_phase, phase_names
 from auvdock.optics.photons.single import SingleScattering
 from auvdock.optics.photons.walk import shoot, turn_of
@@ -84,7 +87,25 @@ def test_measured_functions_integrate_to_what_the_report_prints(name):
     assert float(phase.density(np.radians(measured.angle_deg[20:21]))[0]) == pytest.approx(printed, rel=0.01)
 
 
-@pytest.mark.parametrize("name", ["fournier-forand-x", "fournier-forand-0.9", "petzold"])
+def test_a_mixture_scatters_as_its_parts_do_together():
+    shares = {"petzold-clear": 0.3, "petzold-harbour": 0.7}
+    mixed, angle = load_phase(mixture_name(shares)), np.radians([0.01, 1.0, 30.0, 120.0])
+    parts = [(share, load_phase(name)) for name, share in shares.items()]
+    assert mixed.mean_cosine == pytest.approx(sum(share * part.mean_cosine for share, part in parts))
+    assert mixed.backscatter_ratio == pytest.approx(sum(share * part.backscatter_ratio for share, part in parts))
+    assert mixed.density(angle) == pytest.approx(sum(share * part.density(angle) for share, part in parts), rel=1e-3)
+
+
+@given(share=st.floats(1e-6, 1.0 - 1e-6))
+def test_a_mixtures_name_keeps_its_shares_to_the_bit(share):
+    shares = {"petzold-clear": 1.0 - share, "petzold-coastal": share}
+    assert shares_of(mixture_name(shares)) == shares
+
+
+MIXTURES = ["0.5*petzold-clear", "0.5*petzold-clear+x*petzold-harbour", "0.6*petzold-clear+0.6*petzold-harbour"]
+
+
+@pytest.mark.parametrize("name", ["fournier-forand-x", "fournier-forand-0.9", "petzold", *MIXTURES])
 def test_an_unknown_phase_function_is_refused(name):
     with pytest.raises(ConfigError):
         load_phase(name)

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from optics_scene import DEPTH_M, camera, one_lamp, pose, station_layout
 
+from auvdock.core.beacons import BeaconLayout
 from auvdock.core.transforms import invert
 from auvdock.optics.lens import Lens
 from auvdock.optics.light import beam_profile, peak_intensity_w_sr
+from auvdock.optics.photons.table import photon_halo_of
 from auvdock.optics.radiometry import LightSet
 from auvdock.optics.settings import ImagingCfg
 from auvdock.optics.water import WaterCfg, load_water
@@ -48,13 +50,37 @@ def test_core_falls_as_the_closed_form_without_scattering():
 
 
 @pytest.mark.parametrize("r", [1.0, 8.0, 30.0, 60.0])
-def test_core_and_halo_share_what_absorption_leaves(r):
+def test_core_and_halo_hold_what_photons_say(r):
     water = load_water("pool")
     arrivals = seen_from(one_lamp(), water, r)
     peak = peak_intensity_w_sr(one_lamp().beacons[-1])
     assert arrivals["core_w_m2"][-1] == pytest.approx(peak * math.exp(-0.40 * r) / r**2, rel=1e-9)
+    halo = photon_halo_of(water).within(0.35 * r, 0.05 / 0.35, np.array([math.pi / 2.0]))[0]
+    assert arrivals["halo_w_m2"][-1] == pytest.approx(peak * math.exp(-0.05 * r) / r**2 * halo, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["II", "lake"])
+def test_little_is_scattered_on_a_short_way(name):
+    """Core and halo together are what absorption leaves, but for longer ways and what is scattered back."""
+    water = load_water(name)
+    a, b = water.absorption_per_m[0], water.scattering_per_m[0]
+    r = 0.05 / b
+    arrivals = seen_from(one_lamp(), water, r)
     total = arrivals["core_w_m2"][-1] + arrivals["halo_w_m2"][-1]
-    assert total == pytest.approx(peak * math.exp(-0.05 * r) / r**2, rel=1e-9)
+    peak = peak_intensity_w_sr(one_lamp().beacons[-1])
+    assert total == pytest.approx(peak * math.exp(-a * r) / r**2, rel=0.01)
+
+
+def test_each_lamp_has_the_halo_of_its_colour():
+    water = load_water("pool")
+    for nm in (450.0, 530.0, 620.0):
+        a, b = water.absorption_at(nm), water.scattering_at(nm)
+        other = dataclasses.replace(one_lamp(nm).beacons[-1], name="other")
+        lamps = BeaconLayout((*one_lamp(620.0).beacons, other))
+        arrivals = seen_from(lamps, water, 12.0)
+        halo = photon_halo_of(water).within(12.0 * b, a / b, np.array([math.pi / 2.0]))[0]
+        share = arrivals["halo_w_m2"][-1] / arrivals["core_w_m2"][-1]
+        assert share == pytest.approx(halo * math.exp(12.0 * b), rel=0.01)
 
 
 @pytest.mark.parametrize("name", ["I", "IB", "II", "III", "clear", "pool", "lake"])

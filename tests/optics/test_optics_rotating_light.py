@@ -61,7 +61,7 @@ def streak(unit, range_m, degrees):
     """(h, w) electrons of the beam beside its lamp."""
     image = np.zeros((*unit.lit.lens.shape, 3), dtype=np.float32)
     lit = unit.lit
-    BeamImage(lit.lens, lit.lights, lamp_of(unit), lit.water).add(image, beam_of(unit, range_m, degrees), 1.0)
+    BeamImage(lit.lens, lit.lights, lamp_of(unit)).add(image, beam_of(unit, range_m, degrees), 1.0)
     return image[:, :, 2].astype(float)
 
 

@@ -1,14 +1,14 @@
-import itertools
 import math
 
 import numpy as np
 import pytest
 
-from auvdock.assets import asset_names
 from auvdock.core.errors import ConfigError
-from auvdock.optics.bands import BANDS_NM
-from auvdock.optics.water import WaterCfg, load_water, with_attenuation
+from auvdock.core.strict import load_toml, merge
+from auvdock.optics.photons.table import halo_names, photon_halo_of
+from auvdock.optics.water import WaterCfg, load_water, water_names, with_attenuation
 
+MIXED = "0.25*petzold-clear+0.75*petzold-coastal"
 JERLOV_NM = np.array([450.0, 525.0, 550.0, 600.0, 625.0])
 # Jerlov (1976), Marine Optics, table XXVII: K_d in 1/m at the wavelengths above.
 JERLOV_KD = {
@@ -27,27 +27,18 @@ JERLOV_KD = {
 PURE_ABSORPTION = np.array([0.00922, 0.0434, 0.2755])
 
 
-@pytest.mark.parametrize("name", asset_names("waters"))
+@pytest.mark.parametrize("name", water_names())
 def test_presets_load_with_possible_coefficients(name):
     water = load_water(name)
     assert np.all(water.absorption >= 0.99 * PURE_ABSORPTION)
     assert np.all(water.scattering >= 0.0)
     assert water.source
+    assert photon_halo_of(water).phase == water.phase
 
 
 def test_all_waters_are_there():
-    assert {*JERLOV_KD, "clear", "pool", "lake"} <= set(asset_names("waters"))
-
-
-@pytest.mark.parametrize("name", JERLOV_KD)
-def test_diffuse_attenuation_is_jerlovs(name):
-    expected = np.interp(BANDS_NM, JERLOV_NM, JERLOV_KD[name])
-    assert load_water(name).diffuse_attenuation == pytest.approx(expected, rel=0.01)
-
-
-def test_turbidity_rises_through_the_jerlov_types():
-    c_450 = [load_water(name).attenuation[0] for name in JERLOV_KD]
-    assert all(low < high for low, high in itertools.pairwise(c_450))
+    stations = {"petzold_clear", "petzold_coastal", "petzold_harbour"}
+    assert set(water_names()) == {*JERLOV_KD, *stations, "clear", "pool", "lake"}
 
 
 def test_named_attenuations():
@@ -91,10 +82,73 @@ def test_no_water_is_darker_than_mud(c_450):
 
 
 def test_unknown_water_names_those_that_exist():
-    with pytest.raises(ConfigError, match="lake"):
+    with pytest.raises(ConfigError, match=r"9C.*petzold_harbour.*lake") as caught:
         load_water("soup")
+    assert (caught.value.field, caught.value.value) == ("water", "soup")
 
 
 def test_negative_coefficients_are_refused():
     with pytest.raises(ConfigError, match="absorption_per_m"):
         WaterCfg("x", "test", (-0.1, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("name", ["clear", "pool", "lake", "II", "9C"])
+def test_without_a_measured_phase_function_it_is_petzolds_average(name):
+    water = load_water(name)
+    assert water.phase == "fournier-forand-0.018"
+    # Mobley et al. (2002): Petzold's average particle has b_b / b = 0.0183.
+    assert water.backscattering == pytest.approx(0.0183 * water.scattering, rel=5e-3)
+
+
+def other(**changes):
+    return merge(load_water("lake"), changes)
+
+
+@pytest.mark.parametrize(("name", "ratio"), [("clear", 0.044), ("coastal", 0.013), ("harbour", 0.019)])
+def test_backscattering_is_the_phase_functions_own(name, ratio):
+    # Petzold (1972) prints the ratios.
+    water = other(phase_function=f"petzold-{name}")
+    assert water.backscattering / water.scattering == pytest.approx(np.full(3, ratio), abs=6e-4)
+    assert other(phase_function=f"petzold-{name}", backscatter_ratio=ratio).phase == water.phase
+
+
+def test_backscattering_of_a_mixture_is_that_of_its_parts():
+    water = other(phase_function=MIXED)
+    assert water.backscattering / water.scattering == pytest.approx(np.full(3, 0.25 * 0.044 + 0.75 * 0.013), abs=6e-4)
+
+
+def test_a_phase_function_may_be_written_in_a_file(tmp_path):
+    file = tmp_path / "bay.toml"
+    file.write_text(
+        'name = "bay"\nsource = "ours"\nabsorption_per_m = [0.2, 0.1, 0.3]\nscattering_per_m = [0.6, 0.5, 0.4]\n'
+        f'phase_function = "{MIXED}"\n',
+        encoding="utf-8",
+    )
+    assert load_water(str(file)) == load_toml(WaterCfg, file)
+    assert photon_halo_of(load_water(str(file))).phase == MIXED
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["petzold", "fournier-forand-0.05", "0.5*petzold-clear", "0.5*petzold-clear+0.5*wells", "-1*wells+2*wells", ""],
+)
+def test_a_phase_function_without_a_table_is_refused(name):
+    with pytest.raises(ConfigError) as caught:
+        other(phase_function=name)
+    assert (caught.value.field, caught.value.value) == ("phase_function", name)
+    assert all(known in caught.value.remedy for known in (*halo_names(), "wells"))
+
+
+def test_a_backscatter_ratio_without_a_table_is_refused():
+    with pytest.raises(ConfigError) as caught:
+        other(backscatter_ratio=0.05)
+    assert (caught.value.field, caught.value.value) == ("backscatter_ratio", 0.05)
+    assert "0.018" in caught.value.remedy
+
+
+@pytest.mark.parametrize(("phase", "own"), [("petzold-harbour", "0.019"), ("wells", "0.018"), (MIXED, "0.021")])
+def test_a_backscatter_ratio_that_is_not_the_phase_functions_is_refused(phase, own):
+    with pytest.raises(ConfigError) as caught:
+        other(phase_function=phase, backscatter_ratio=0.03)
+    assert (caught.value.field, caught.value.value) == ("backscatter_ratio", 0.03)
+    assert own in caught.value.remedy

@@ -22,6 +22,7 @@ BINS = 6
 LABELS = {
     "current": "current speed, m/s",
     "attenuation": "attenuation at 450 nm, 1/m",
+    "turbidity": "attenuation at 530 nm, Petzold's waters, 1/m",
     "current_direction": "current direction, °",
     "gust": "gusts, standard deviation, m/s",
     "shear": "shear, 1/m",
@@ -120,8 +121,8 @@ class Map:
 
 
 def map_axes(cfg: CampaignCfg) -> tuple[AxisCfg, AxisCfg | None] | None:
-    """The axes of the success map: attenuation across and current down, or the first that there are."""
-    wanted = {"attenuation": 0, "current": 1}
+    """The axes of the success map: turbidity across and current down, or the first that there are."""
+    wanted = {"attenuation": 0, "turbidity": 0, "current": 1}
     axes = sorted(
         (axis for axis in cfg.axes if not axis.is_grid or len(axis.grid) > 1), key=lambda axis: wanted.get(axis.name, 2)
     )

@@ -14,6 +14,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
 from auvdock.optics.phase_function import fournier_forand
+from auvdock.optics.photons.mixture import shares_of
 
 __all__ = ["FOURNIER_FORAND", "MeasuredPhase", "PhaseFunction", "load_phase", "phase_names"]
 
@@ -91,12 +92,16 @@ def load_phase(name: str) -> PhaseFunction:
 
     `fournier-forand-R` is Fournier and Forand's with a share R of backscattering: n = 1.10 and μ = 3.5835 for 0.018,
     which is Petzold's average; any other on the line n = 1.01 + 0.1542 (μ - 3) on which that pair lies (Mobley et al.
-    2002, equation 7). The others are Petzold's (1972) as measured: clear ocean, coastal ocean, turbid harbour.
+    2002, equation 7). The others are Petzold's (1972) as measured: clear ocean, coastal ocean, turbid harbour. A
+    mixture is the sum of its parts, each with its share of scattering (`shares_of`).
 
     Raises:
         ConfigError: no such name.
     """
-    grid = np.geomspace(_FIRST_RAD, math.pi, _ANGLES)
+    grid, shares = np.geomspace(_FIRST_RAD, math.pi, _ANGLES), shares_of(name)
+    if len(shares) > 1:
+        parts = [share * load_phase(part).density_sr for part, share in shares.items()]
+        return _tabulated(name, grid, np.sum(parts, axis=0))
     if name.startswith(FOURNIER_FORAND):
         # Its removable pole at δ = 1 would have to fall on an angle of the grid to 1e-8, which it does not.
         index, slope = _particles(name)
