@@ -80,6 +80,9 @@ class ControlCfg(Checked):
     """Mode machine."""
     rotating: RotatingControlCfg = field(default_factory=RotatingControlCfg)
     """The way to the cone before the mouth, by a rotating beacon."""
+    predicted_poses: bool = False
+    """Also fuse poses that are predicted from tracks while lights are hidden (paper A, section 4.1), with their
+    covariance, as if they were measured."""
     controller: str = "own"
     """"own", the station's pilot, or a pilot of yours as "package.module:Name" (`auvdock.controllers.named`)."""
 
@@ -162,7 +165,9 @@ class ConicalPilot:
 
     def _track(self, relative: RelativeState | None, percept: Percept | None, senses: Senses) -> RelativeState | None:
         """Relative state after this period."""
-        pose = percept.pose if percept is not None and percept.pose is not None and percept.pose.measured else None
+        pose = percept.pose if percept is not None else None
+        if pose is not None and not (pose.measured or self.cfg.predicted_poses):
+            pose = None
         if relative is None:
             return self._filter.start(pose, senses) if pose is not None else None
         entrance = percept.entrance if percept is not None and self._has_entrance else None

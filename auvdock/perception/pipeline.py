@@ -14,6 +14,7 @@ from auvdock.core.checked import Checked
 from auvdock.core.contracts import Detections, Percept, Proprioception
 from auvdock.core.errors import ConfigError
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
+from auvdock.perception.algorithm_1 import Algorithm1Association, Algorithm1Cfg
 from auvdock.perception.association import Association
 from auvdock.perception.authentication import AuthenticationCfg
 from auvdock.perception.credibility import CredibilityCfg
@@ -30,7 +31,7 @@ __all__ = ["ASSOCIATIONS", "AssociationName", "BeaconPerception", "PerceptionCfg
 
 _LEAST_SIGMA_RAD = math.radians(1.0)
 """What compass and clock leave of the station's heading at best (ours)."""
-AssociationName = Literal["spatiotemporal", "hungarian_ransac"]
+AssociationName = Literal["spatiotemporal", "hungarian_ransac", "algorithm_1"]
 """Ways to tell which light is which beacon."""
 ASSOCIATIONS: tuple[AssociationName, ...] = get_args(AssociationName)
 
@@ -42,7 +43,8 @@ class PerceptionCfg(Checked):
     detector: str = "threshold"
     """"threshold", "blob" or a detector of your own as "package.module:Name"."""
     association: AssociationName = "spatiotemporal"
-    """"spatiotemporal" (paper A's method) or "hungarian_ransac" (its comparison)."""
+    """"spatiotemporal" (ours, built on paper A's), "algorithm_1" (paper A's as printed) or "hungarian_ransac" (its
+    comparison)."""
     station_yaw_deg: float = 0.0
     """Heading of the station's approach axis in the world, as surveyed."""
     tracker: TrackerCfg = TrackerCfg()
@@ -55,6 +57,8 @@ class PerceptionCfg(Checked):
     """When a pose is believed."""
     hungarian_ransac: HungarianRansacCfg = HungarianRansacCfg()
     """The comparison's settings."""
+    algorithm_1: Algorithm1Cfg = Algorithm1Cfg()
+    """What paper A's association as printed has of its own."""
     line_of_sight: LineOfSightCfg = LineOfSightCfg()
     """Bearings without a pose."""
     rotating: ForwardBeaconCfg = ForwardBeaconCfg()
@@ -106,6 +110,10 @@ class BeaconPerception:
         if cfg.association == "spatiotemporal":
             self._association = SpatiotemporalAssociation(
                 cfg.authentication, cfg.pnp, cfg.credibility, sigma, camera, layout
+            )
+        elif cfg.association == "algorithm_1":
+            self._association = Algorithm1Association(
+                cfg.algorithm_1, cfg.authentication, cfg.pnp, sigma, camera, layout
             )
         else:
             self._association = HungarianRansacAssociation(

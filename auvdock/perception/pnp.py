@@ -184,6 +184,27 @@ class PnpSolver:
             return None
         return self._refine(_packed(*start), light_table(points_m, pixels, sigma_px), attitude, "plain")
 
+    def by_count(
+        self, points_m: Array, pixels: Array, sigma_px: Array, attitude: Attitude, start: PnpSolution | None
+    ) -> PnpSolution | None:
+        """Paper A's choice as printed (section 4.3), attitude ignored: five lights or more SQPnP, fewer the iterative.
+
+        Args:
+            points_m: (n, 3) beacons in the station frame.
+            pixels: (n, 2) their images.
+            sigma_px: (n,) standard deviation of each image point per axis.
+            attitude: the solution is told how far it is off; it must have no weight in the settings.
+            start: where three lights begin, for which OpenCV's iterative solver needs a start; None gives none.
+        """
+        n = len(points_m)
+        if n >= 5:
+            return self._sqpnp(light_table(points_m, pixels, sigma_px), attitude)
+        if n == 4:
+            return self.plain(points_m, pixels, sigma_px, attitude)
+        if n < 3 or start is None:
+            return None
+        return self._refine(start.record["pose"], light_table(points_m, pixels, sigma_px), attitude, "iterative")
+
     def mirrored(self, solution: PnpSolution, lights: Records[Light], attitude: Attitude) -> PnpSolution | None:
         """The other pose of a plane (Schweighofer & Pinz 2006), refined from the mirror image of a solution.
 
