@@ -20,6 +20,7 @@ ORDER = (
     "envs",
     "episode",
     "campaign",
+    "dataset",
     "recording",
     "experiments",
     "cli",
