@@ -9,6 +9,7 @@ from auvdock.dataset.rules import Foreign, Light
 from auvdock.numeric.constants import BLUE, RED
 from auvdock.optics.flash import FlashOptics
 from auvdock.optics.imaging import UnderwaterCamera
+from auvdock.optics.spots import Spots
 from auvdock.optics.view import View
 
 __all__ = ["Onlooker"]
@@ -54,12 +55,16 @@ class Onlooker:
         """(k,) radii of the lights' profiles."""
         return self.lit.spots.radii_px
 
+    def spots(self, view: View) -> Spots:
+        """The lights whose centre is on the sensor, as spots."""
+        return self._flash.spots(view)
+
     def lights(self, view: View, exposure_s: float) -> list[Light]:
         """All lamps that shine onto the sensor or just beside it."""
         arrivals = view.arrivals.copy()
         pixels, near = self.lit.lens.locate(arrivals["ray_camera"].copy(), self._margin_px)
         arrivals["pixel"], arrivals["inside"] = pixels, near & view.in_sight
-        spots = self._flash.spots(view._replace(arrivals=arrivals))
+        spots = self.spots(view._replace(arrivals=arrivals))
         lights: list[Light] = []
         lamps, pixels = spots.rows["lamp"], spots.rows["pixel"].copy()
         if spots.flash is not None:

@@ -158,7 +158,7 @@ class _Shooting:
         auto = imager.exposure
         auto.reset()
         if imager.tag is None and imager.lit.lamp is None:
-            auto.settle(predicted_share(imager.lit, view, metered=auto.metered))
+            auto.settle(predicted_share(imager.lit, view, self._onlooker.spots(view), auto.metered))
         else:
             bright = np.sort(imager.electrons(view, 1.0).reshape(-1)[::_METERED])
             level = imager.lit.scale(1.0).saturated_e
