@@ -41,6 +41,14 @@ def _ordered(owner: Checked, *names: str) -> None:
             raise ConfigError(name, [low, high], "the smaller value first")
 
 
+def _absorption_per_m(water: str, field: str) -> float:
+    """Of a water by name or file, at 450 nm."""
+    try:
+        return load_water(water).absorption_per_m[0]
+    except ConfigError as error:
+        raise ConfigError(field, water, error.remedy) from error
+
+
 @dataclass(frozen=True)
 class SceneDraw(Checked):
     """Shares of the kinds of scene; they need not add up to 1."""
@@ -111,7 +119,7 @@ class WaterDraw(Checked):
         _ordered(self, "attenuation_per_m")
         if not self.names:
             raise ConfigError("names", self.names, "at least one water")
-        clearest = min(load_water(name).absorption_per_m[0] for name in self.names)
+        clearest = min(_absorption_per_m(name, f"names[{k}]") for k, name in enumerate(self.names))
         if self.attenuation_per_m[0] < clearest / 0.8:
             remedy = f"{clearest / 0.8:.3g} 1/m or more: absorption takes up to four fifths of it in the clearest water"
             raise ConfigError("attenuation_per_m[0]", self.attenuation_per_m[0], remedy)

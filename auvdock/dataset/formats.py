@@ -60,10 +60,7 @@ def yolo_text(frame: Mapping[str, Any], *, ignored: bool) -> str:
 def data_yaml() -> str:
     """What YOLO's trainers read first."""
     names = "".join(f"  {class_id}: {name}\n" for class_id, name in CLASSES.items())
-    return (
-        "path: .\ntrain: train/images\nval: val/images\ntest: test/images\n"
-        f"kpt_shape: [1, 3]\nflip_idx: [0]\nnames:\n{names}"
-    )
+    return f"train: train/images\nval: val/images\ntest: test/images\nkpt_shape: [1, 3]\nflip_idx: [0]\nnames:\n{names}"
 
 
 def _annotation(label: Mapping[str, Any], number: int, image_id: int) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -67,7 +67,7 @@ class LabelledFrame:
 
     image: Image
     labels: tuple[Label, ...]
-    facts: dict[str, str | float | int]
+    facts: dict[str, Any]
 
 
 def clipped(xyxy: Array, width_px: int, height_px: int) -> Array:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -14,7 +16,7 @@ from typing import Any
 import cv2
 
 from auvdock import __version__
-from auvdock.campaign.worker import THREAD_LIMITS
+from auvdock.campaign.worker import THREAD_LIMITS, die_with_parent
 from auvdock.core.errors import AuvdockError
 from auvdock.core.strict import to_plain
 from auvdock.dataset.config import DatasetCfg
@@ -95,6 +97,13 @@ class Making:
 def _make(cfg: DatasetCfg, scene: SceneSpec, folder: Path, shard: bool) -> SceneSpec:
     Store(folder).put(scene, render_scene(cfg, scene), shard=shard)
     return scene
+
+
+def _start_worker() -> None:
+    """Leave the interrupt key to the parent, die with it, and use one core."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=die_with_parent, daemon=True).start()
+    cv2.setNumThreads(1)
 
 
 @contextmanager

@@ -109,7 +109,7 @@ class _Shooting:
         labels = self._labels(electrons, scale, view, exposure_s, gain)
         image = self._sensor.expose(electrons, gain)
         setup = condition.setup
-        facts: dict[str, str | float | int] = {
+        facts: dict[str, Any] = {
             "kind": self._stage.kind,
             "lights": self._stage.lights,
             "water": setup.water.name,

@@ -159,7 +159,7 @@ def test_frames_are_shared_out_to_the_last_one():
         (["--config", "nothing"], "", "config"),
         ([], "[scenes]\nframez = 3\n", "scenes.framez"),
         ([], "[scenes]\nframes = 0\n", "scenes.frames"),
-        ([], "[water]\nnames = ['mud']\n", "water"),
+        ([], "[water]\nnames = ['pool', 'mud']\n", "water.names[1]"),
         ([], "[water]\nattenuation_per_m = [0.01, 1.0]\n", "water.attenuation_per_m"),
         ([], "[range]\ntest = [1.0]\n", "range.test"),
         ([], "[range]\nedges = [2.0, 1.0]\n", "range.edges"),

@@ -64,7 +64,8 @@ def test_a_dip_in_one_channel_is_enough():
     assert (SCALE.codes(image[30, 40:53, 2].astype(float)) >= 255.0).all()
     assert owners_of(labels_of(lights)) == {"one", "other"}
     grey = [
-        light(item.name, *item.pixel, item.profile_e.max(), sigma_px=3.0, colour=(1.0, 1.0, 1.0)) for item in lights
+        light(item.name, item.pixel[0], item.pixel[1], item.profile_e.max(), sigma_px=3.0, colour=(1.0, 1.0, 1.0))
+        for item in lights
     ]
     assert len(owners_of(labels_of(grey))) == 1
 
