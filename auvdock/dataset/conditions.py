@@ -140,7 +140,8 @@ def _turbidity(
     reach, edges = cfg.range, cfg.range.edges
     most_m = reach.most_height_m if stage.is_platform else reach.most_m
     low_c, high_c = cfg.water.attenuation_per_m
-    at = _chosen(reach.test if spec.split == "test" else reach.train, float(rng.random()))
+    shares = reach.platform if stage.is_platform else reach.test if spec.split == "test" else reach.train
+    at = _chosen(shares, float(rng.random()))
     low, high = edges[at], edges[at + 1]
     # Clear enough that some of the band lies farther than the nearest place, turbid enough that all lies within reach.
     least, most = max(low_c, high / most_m), min(high_c, 0.5 * high / reach.least_m)

@@ -141,12 +141,14 @@ class RangeDraw(Checked):
     """Shares of the bands in training and validation."""
     test: tuple[NotNegative, ...]
     """Shares in the test split: most at 5 to 14, for nearer by every detector finds all."""
+    platform: tuple[NotNegative, ...]
+    """Shares above a platform, in every split: its tag is lost beyond some 4."""
 
     def __post_init__(self) -> None:
         """Refuse bands out of order or without shares."""
         if len(self.edges) < 2 or any(low >= high for low, high in pairwise(self.edges)):
             raise ConfigError("edges", self.edges, "two or more rising numbers")
-        for name in ("train", "test"):
+        for name in ("train", "test", "platform"):
             shares = getattr(self, name)
             if len(shares) != len(self.edges) - 1 or not sum(shares) > 0.0:
                 raise ConfigError(name, shares, f"{len(self.edges) - 1} shares, one for each band, not all of them 0")

@@ -75,10 +75,7 @@ class Making:
                 yield _make(self._cfg, scene, folder, self._shards)
             return
         context = multiprocessing.get_context("spawn")  # OpenGL contexts do not survive a fork
-        with (
-            _limited_threads(),
-            ProcessPoolExecutor(workers, context, initializer=cv2.setNumThreads, initargs=(1,)) as pool,
-        ):
+        with _limited_threads(), ProcessPoolExecutor(workers, context, initializer=_start_worker) as pool:
             tasks = [pool.submit(_make, self._cfg, scene, folder, self._shards) for scene in self.missing]
             try:
                 for task in tasks:

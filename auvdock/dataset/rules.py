@@ -2,9 +2,10 @@
 
 All are decided on the frame's expected image, which has no noise. `docs/dataset.md` tells the rules in full.
 
-1. A light's signal is its contrast: the code at its centre less the code that its own halo leaves on a ring about it,
-   in the channel where that is most of the noise of a code. The ring's radius is half of `cap_px`, or two radii of the
-   saturated disc if that is more. Below `dim_sigma` noises nothing is labelled, below `seen_sigma` it is ignored.
+1. A light's signal is its contrast: how much the code at its centre rises above the picture on a ring about it by the
+   light that it sends there, in the channel where this is most of the noise of a code. The ring's radius is half of
+   `cap_px`, or two radii of the saturated disc if that is more. Below `dim_sigma` noises nothing is labelled, below
+   `seen_sigma` it is ignored.
 2. A light stands by itself if its peak rises by `part_sigma` noises above the saddle towards every brighter light, in
    any channel (its topographic prominence). Else it belongs to the brighter light behind the highest saddle, and the
    brightest of a group owns their box.
@@ -41,6 +42,7 @@ Foreign = Literal["", "mirror", "stranger", "negative"]
 
 _HALF = 0.5
 _RING_DISCS = 2.0
+_RING = np.array([np.cos(np.arange(24) * (math.tau / 24)), np.sin(np.arange(24) * (math.tau / 24))])
 _TOP_DN = 255.0
 
 
@@ -190,18 +192,27 @@ def _contrast(
     electrons: NDArray[np.float32], scale: SensorScale, light: Light, radii_px: Array, rules: LabelRules
 ) -> tuple[float, float]:
     """Contrast of a light over the noise of a code, and the radius at which half of the contrast is left."""
-    height, width = electrons.shape[:2]
-    x, y = (int(np.clip(round(float(p)), 0, n - 1)) for p, n in zip(light.pixel, (width, height), strict=True))
-    peak_e = electrons[y, x].astype(np.float64)
-    others_e = np.maximum(peak_e - light.profile_e[0], 0.0)
-    codes = np.minimum(scale.codes(others_e + light.profile_e), _TOP_DN)
-    burnt = np.flatnonzero(codes.max(axis=1) >= SATURATED_CODE)
+    burnt = np.flatnonzero(scale.codes(light.profile_e).max(axis=1) >= SATURATED_CODE)
     ring_px = max(0.5 * rules.cap_px, _RING_DISCS * float(radii_px[burnt[-1]]) if len(burnt) else 0.0)
-    ring = np.array([np.interp(ring_px, radii_px, codes[:, c]) for c in range(3)])
-    ratio = (codes[0] - ring) / scale.noise_dn(peak_e)
+    around_e = _around(electrons, light.pixel, ring_px)
+    at_ring_e = np.array([np.interp(ring_px, radii_px, light.profile_e[:, c]) for c in range(3)])
+    rise_e = np.maximum(light.profile_e - at_ring_e, 0.0)
+    rise_dn = np.minimum(scale.codes(around_e + rise_e), _TOP_DN) - np.minimum(scale.codes(around_e), _TOP_DN)
+    ratio = rise_dn[0] / scale.noise_dn(around_e + rise_e[0])
     best = int(np.argmax(ratio))
-    below = codes[:, best] - ring[best] < _HALF * (codes[0, best] - ring[best])
-    return float(ratio[best]), float(radii_px[np.argmax(below)])
+    below = rise_dn[:, best] < _HALF * rise_dn[0, best]
+    return float(ratio[best]), float(radii_px[np.argmax(below)]) if below.any() else ring_px
+
+
+def _around(electrons: NDArray[np.float32], pixel: Array, radius_px: float) -> Array:
+    """(3,) median of the picture on a ring about a pixel, as far as the ring lies within it."""
+    height, width = electrons.shape[:2]
+    x, y = np.rint(pixel[0] + radius_px * _RING[0]), np.rint(pixel[1] + radius_px * _RING[1])
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    if not inside.any():
+        return np.zeros(3)
+    ring: Array = np.median(electrons[y[inside].astype(np.int64), x[inside].astype(np.int64)], axis=0)
+    return ring.astype(np.float64)
 
 
 def _bounded(whole: Array, centre_px: Array, rules: LabelRules) -> Array:
