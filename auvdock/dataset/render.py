@@ -85,7 +85,7 @@ class _Shooting:
         self._sensor = Sensor(camera.width_px, camera.height_px, condition.imaging)
         self._sensor.reset(sensor_rng)
         self._onlooker = Onlooker(imager, 0.5 * cfg.labels.cap_px)
-        self._room = Room(condition.setup.T_world_station[2, 3] * -1.0, stage.station.floor_below_m)
+        self._room = Room(-float(condition.setup.T_world_station[2, 3]), stage.station.floor_below_m)
 
     def frames(self, count: int) -> Iterator[LabelledFrame]:
         """So many frames."""

@@ -211,8 +211,8 @@ def _around(electrons: NDArray[np.float32], pixel: Array, radius_px: float) -> A
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
     if not inside.any():
         return np.zeros(3)
-    ring: Array = np.median(electrons[y[inside].astype(np.int64), x[inside].astype(np.int64)], axis=0)
-    return ring.astype(np.float64)
+    ring = electrons[y[inside].astype(np.int64), x[inside].astype(np.int64)]
+    return np.asarray(np.median(ring, axis=0), dtype=np.float64)
 
 
 def _bounded(whole: Array, centre_px: Array, rules: LabelRules) -> Array:

@@ -115,6 +115,18 @@ def test_mirror_images_are_ignored():
     assert reasons == {"mirror"}
 
 
+def test_a_camera_with_a_memory_gives_the_rays_of_one_without():
+    cfg = small_cfg()
+    stage, _ = next(drawn(cfg, 1, 0, (1.0, 0.0, 0.0)))
+    plain = Camera(**{field.name: getattr(stage.camera, field.name) for field in dataclasses.fields(Camera)})
+    rng = np.random.default_rng(0)
+    grids = [rng.uniform(0.0, 100.0, (count, 2)) for count in (5, 4000, 4000)]
+    for grid in [*grids, *grids]:
+        rays = stage.camera.normalise(grid)
+        assert np.array_equal(rays, plain.normalise(grid))
+        rays[:] = 0.0  # whoever asked may do so with the answer
+
+
 def test_unlit_stations_have_no_light_to_find():
     cfg = small_cfg(
         scenes={"array": 0.0, "rotating_front": 0.0, "rotating_side": 0.0, "landing": 0.0, "unlit": 1.0},
