@@ -21,6 +21,7 @@ ORDER = (
     "envs",
     "episode",
     "campaign",
+    "dataset",
     "recording",
     "experiments",
     "cli",

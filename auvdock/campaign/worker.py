@@ -17,7 +17,7 @@ from auvdock.campaign.job import Job, attempt
 from auvdock.core.errors import AuvdockError, AuvdockWarning
 from auvdock.core.memory import relax_collector
 
-__all__ = ["READY", "THREAD_LIMITS", "work"]
+__all__ = ["READY", "THREAD_LIMITS", "die_with_parent", "work"]
 
 READY = "ready"
 """First message of a worker that has built its job."""
@@ -38,7 +38,7 @@ def work(connection: Connection, job: Job) -> None:
     leaves the interrupt key to its parent, and dies with it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_die_with_parent, daemon=True).start()
+    threading.Thread(target=die_with_parent, daemon=True).start()
     cv2.setNumThreads(1)
     if not current_process().name.endswith("-0"):  # all have the same machine to tell of; one is enough
         warnings.simplefilter("ignore", AuvdockWarning)
@@ -53,7 +53,8 @@ def work(connection: Connection, job: Job) -> None:
             connection.send(error)
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
+    """Wait for the parent process to end, then end this one; for a thread of its own."""
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -66,6 +66,7 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.fit_landing:run",
         "fit the beacons fidelity of a landing to detectors of lights and tags",
     ),
+    ("dataset",): ("auvdock.cli.dataset:run", "render labelled frames for learned detectors"),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),
 }
 """Words of a command: where it lives (imported only when asked for) and what it does."""
