@@ -10,12 +10,12 @@ import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.errors import ConfigError
-from auvdock.optics.wells import wells_halo
 from auvdock.optics.photons.making import left_after, ring_radiance
 from auvdock.optics.photons.phase import load_phase
 from auvdock.optics.photons.table import load_halo, phase_of
 from auvdock.optics.photons.walk import Tally, shoot
 from auvdock.optics.water import WaterCfg
+from auvdock.optics.wells import wells_halo
 
 __all__ = ["CHECKED_A_B", "CHECKED_BR", "HALF_ANGLES_DEG", "PHASES", "HaloCase", "HaloCheck", "check_halo", "halo_case"]
 
