@@ -173,9 +173,7 @@ def _case(args: Halo, name: str) -> int:
             f"{case.wells[i] / case.halo[i]:.2f}",
         )
     console.print(table)
-    console.print(
-        f"{_DEFINITION}; the simulator flies the table, Wells' function (1973) is for comparison", highlight=False
-    )
+    console.print(f"{_DEFINITION}; the simulator flies the table; Wells (1973) is for comparison", highlight=False)
     return 0
 
 
