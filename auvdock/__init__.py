@@ -1,6 +1,6 @@
 """auvdock: closed-loop camera docking of autonomous underwater vehicles in MuJoCo.
 
-Importing it registers the environments, so that `gymnasium.make("auvdock/ConicalDocking-v0")` finds them.
+Importing it registers the environments, so that `gymnasium.make("auvdock/ConicalDocking-v1")` finds them.
 """
 
 from importlib.metadata import version

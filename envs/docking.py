@@ -74,7 +74,7 @@ place of the `cfg`'s), `reward` (`RewardCfg`, or a mapping of the fields to chan
 `gymnasium.make` itself takes `max_episode_steps`, a number of control periods: its own wrapper then truncates, and
 `failure_reason` stays None. Any other argument that cannot be used raises `ConfigError` with its name.
 
-For training, something like `gymnasium.make("auvdock/ConicalDocking-v0", start={"min_range_m": 3, "max_range_m": 5},
+For training, something like `gymnasium.make("auvdock/ConicalDocking-v1", start={"min_range_m": 3, "max_range_m": 5},
 time_limit_s=30)`, wrapped in `auvdock.envs.wrappers.SetPointAction`: the default's 240 s are 7,200 steps.
 
 ## Version history
@@ -101,7 +101,7 @@ __all__ = ["DockingEnv"]
 
 
 class DockingEnv(VehicleEnv[WorldCfg, StartCfg, PerceptionCfg]):
-    """`auvdock/ConicalDocking-v0`; see the module's docstring for the tables."""
+    """`auvdock/ConicalDocking-v1`; see the module's docstring for the tables."""
 
     default_cfg = staticmethod(WorldCfg)
     default_perception = staticmethod(PerceptionCfg)

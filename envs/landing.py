@@ -20,7 +20,7 @@ by. Success is defined in `auvdock.core.landing_station.LandingLatchCfg`.
 | 6 | upward thrust, aft starboard | -1 | 1 | aft_starboard_vertical | thrust, N |
 | 7 | upward thrust, aft port | -1 | 1 | aft_port_vertical | thrust, N |
 
-For `remus_hybrid` they are those of `auvdock/ConicalDocking-v0`, n = 7. Limits, places and directions stand in
+For `remus_hybrid` they are those of `auvdock/ConicalDocking-v1`, n = 7. Limits, places and directions stand in
 `assets/vehicles/`.
 
 ## Observation space
@@ -106,7 +106,7 @@ _LEVELS = {"none": 0.0, "lights": 1.0, "tag": 2.0, "fused": 3.0}
 
 
 class LandingEnv(VehicleEnv[LandingWorldCfg, LandingStartCfg, LandingPerceptionCfg]):
-    """`auvdock/LandingDocking-v0`; see the module's docstring for the tables."""
+    """`auvdock/LandingDocking-v1`; see the module's docstring for the tables."""
 
     default_cfg = staticmethod(LandingWorldCfg)
     default_perception = staticmethod(LandingPerceptionCfg)

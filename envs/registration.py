@@ -7,9 +7,9 @@ import gymnasium
 __all__ = ["ENVIRONMENTS", "register_envs"]
 
 ENVIRONMENTS = {
-    "auvdock/ConicalDocking-v0": "auvdock.envs.docking:DockingEnv",
-    "auvdock/RotatingBeaconDocking-v0": "auvdock.envs.rotating_docking:RotatingDockingEnv",
-    "auvdock/LandingDocking-v0": "auvdock.envs.landing:LandingEnv",
+    "auvdock/ConicalDocking-v1": "auvdock.envs.docking:DockingEnv",
+    "auvdock/RotatingBeaconDocking-v1": "auvdock.envs.rotating_docking:RotatingDockingEnv",
+    "auvdock/LandingDocking-v1": "auvdock.envs.landing:LandingEnv",
 }
 """Names of all environments and where each lives."""
 

@@ -1,7 +1,7 @@
 """Gymnasium environment for docking by a rotating beacon.
 
 ## Description
-The conical station of `auvdock/ConicalDocking-v0` carries a rotating beacon on top: a beam of 10° that turns at 0.5
+The conical station of `auvdock/ConicalDocking-v1` carries a rotating beacon on top: a beam of 10° that turns at 0.5
 revolutions a second, counter-clockwise seen from above, and points along the approach axis when the station's clock
 shows a whole turn. The vehicle starts anywhere in a ring around the station with any heading, most often where no other
 lamp can be seen, and must come around to the mouth and dock. It does not know the station's compass heading; the moment
@@ -24,7 +24,7 @@ at which the beam sweeps past tells its azimuth: A = 360° · 0.5 /s · t, with 
 ## Observation space
 Chosen by `observation`; boxes are float64 and bounded by ±20,000.
 
-`"state"` (default): `Box` of shape (19,), the true state, as in `auvdock/ConicalDocking-v0`. Privileged.
+`"state"` (default): `Box` of shape (19,), the true state, as in `auvdock/ConicalDocking-v1`. Privileged.
 
 | Num | Observation | Unit |
 |---|---|---|
@@ -58,7 +58,7 @@ Uniform within `WorldCfg.start`: radius 20 to 45 m, azimuth ±180°, ±1.5 m in 
 `station_heading="unknown"` each episode draws the compass' datum in ±180°.
 
 ## Episode end
-As in `auvdock/ConicalDocking-v0`, with `WorldCfg.limits.max_time_s` 600 s.
+As in `auvdock/ConicalDocking-v1`, with `WorldCfg.limits.max_time_s` 600 s.
 
 ## Arguments
 `cfg` (`WorldCfg`, by default `auvdock.envs.config.rotating_world_cfg()`), `observation` ("state", "pose", "image"),
@@ -83,6 +83,6 @@ __all__ = ["RotatingDockingEnv"]
 
 
 class RotatingDockingEnv(DockingEnv):
-    """`auvdock/RotatingBeaconDocking-v0`; see the module's docstring for the tables, `DockingEnv` for the arguments."""
+    """`auvdock/RotatingBeaconDocking-v1`; see the module's docstring for the tables, `DockingEnv` for the arguments."""
 
     default_cfg = staticmethod(rotating_world_cfg)

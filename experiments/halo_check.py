@@ -1,4 +1,4 @@
-"""The halo's table, and the model that is flown, against photons sent out afresh; and one water at one range."""
+"""The halo's table, and Wells' model, against photons sent out afresh; and one water at one range."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CHECKED_A_B = (0.05, 0.1, 0.2, 0.5, 1.0)
 HALF_ANGLES_DEG = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0)
 """Half angles of all readings."""
 WELLS_RAD = (0.02, 0.03, 0.05)
-"""θ0 of the pool, of clear water, of all others, as they are flown."""
+"""θ0 of the pool, of clear water, of all others."""
 
 _EDGES_DEG = (0.2, 0.5, 1.0, 2.0, 5.0, *np.arange(10.0, 41.0, 2.5).tolist(), 90.0)
 _BATCHES = 10
@@ -129,7 +129,7 @@ class HaloCase:
     error: Array
     """(8,) its standard error, relative to it."""
     wells: Array
-    """(8,) the same by Wells' function, which is what is flown."""
+    """(8,) the same by Wells' function."""
 
 
 def halo_case(water: WaterCfg, range_m: float, wavelength_nm: float) -> HaloCase:

@@ -1,4 +1,4 @@
-"""`auvdock reproduce halo`: the halo's table and the flown model against photons, or one water at one range."""
+"""`auvdock reproduce halo`: the halo's table and Wells' model against photons, or one water at one range."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _DEFINITION = (
 
 @dataclass(frozen=True)
 class Halo:
-    """Light scattered about a lamp: a table made by single photons against photons sent out afresh, and what is flown.
+    """Light scattered about a lamp: a table made by single photons against photons sent out afresh, and Wells' model.
 
     With --water and --range it tells what arrives in that one case. With --make-table it makes tables instead.
     Exit code: 1 if the table is off by more than 10 % where the fresh photons can tell, or they never can; else 0.
@@ -146,7 +146,7 @@ def _case(args: Halo) -> int:
         "core": case.core,
         "halo_within": halo,
         "halo_standard_error": _by_angle(case.error),
-        "flown_today": {
+        "comparison": {
             "model": "Wells 1973",
             "scattering_angle_rad": water.scattering_angle_rad,
             "within": _by_angle(case.core + case.wells),
@@ -176,7 +176,7 @@ def _case(args: Halo) -> int:
             f"{case.wells[i] / case.halo[i]:.2f}",
         )
     console.print(table)
-    console.print(f"{_DEFINITION}; the simulator flies Wells' function (1973) today", highlight=False)
+    console.print(f"{_DEFINITION}; the simulator flies the table; Wells (1973) is for comparison", highlight=False)
     return 0
 
 
@@ -229,7 +229,7 @@ def _print(rows: Sequence[dict[str, Any]]) -> None:
         counts = [str(row[name]) for name in ("readings", "judged", "within_10_percent")]
         table.add_row(row["phase"], *counts, *(f"{100 * value:.1f} %" for value in shares))
     console.print(table)
-    title = "Wells' function, which is flown today, over fresh photons: least to most"
+    title = "Wells' function over fresh photons: least to most"
     table = Table(title=title, title_justify="left")
     table.add_column("phase function")
     for theta0 in WELLS_RAD:

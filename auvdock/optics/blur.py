@@ -27,7 +27,7 @@ _FAR_SIGMA = 8.0
 
 
 def blurred_halo(halo: HaloTable, radii_px: Array, rad_per_px: float, variances_px2: Array) -> Array:
-    """(levels, rows, k) halo of unit light per pixel at radii (k,), for each of some variances (levels,) of the blur."""
+    """(levels, rows, k) halo of unit light per pixel at radii (k,), for each of some variances (levels,)."""
     smear, far = _operator(tuple(radii_px.tolist()), rad_per_px, tuple(variances_px2.tolist()))
     rings = np.diff(halo.encircled_rows(HALO_ANGLE_RAD), axis=1, prepend=0.0)
     levels, k = far.shape

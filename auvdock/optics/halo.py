@@ -60,8 +60,8 @@ class HaloTable:
     Rows are even in ln(1 + b r / 2), 112 for b r from 0 to 60, and read linearly: within 2 % of the photons' table for
     a / b up to 1, and for more wherever absorption leaves e^-40 of the light. Beyond b r = 60 the last row is held, so
     is a / b beyond 0.01 and 100. Inside 10 µrad the light within an angle goes on as the same power of it, its radiance
-    is held. What arrives from behind a camera, beyond 90° off the lamp, no photon was counted for: it has the radiance (π - θ) / sin θ × 2/π
-    of that at 90°, single scattering by a phase function that is even backwards. `whole` is without it.
+    is held. No photon was counted that arrives from behind a camera, beyond 90° off the lamp: radiance goes on as 2/π ×
+    (π - θ) / sin θ of that at 90°, single scattering by a phase function that is even backwards; `whole` is without it.
 
     Attributes:
         places: where in a block which b r is, one row.

@@ -86,8 +86,12 @@ class _Fine(Record):
     """`Lens.metric` there."""
     sigma_px: float
     """Of the core."""
+    inside: float
+    """Share of the halo that the remainder holds; below 0 where the halo is flatter than its smooth part."""
+    pixel_sr: float
+    """Solid angle of a pixel there."""
     halo_e: Annotated[NDArray[np.float32], 3]
-    """Electrons of the remainder."""
+    """Electrons of the whole halo."""
     core_e: Annotated[NDArray[np.float32], 3]
     """Electrons of the core."""
 
@@ -153,8 +157,9 @@ class LightsImage:
         inside = encircled - math.pi * t2 * (level + 0.5 * curve * t2)
         colour = self._channel[index] * exposure_s
         lamps["halo"], lamps["pixel"], lamps["sigma_px"] = halos, pixels[index], sigma
-        lamps["metric"] = self._lens.metric_at(np.rint(pixels[index]))
-        lamps["halo_e"] = colour * (arrivals["halo_w_m2"][index] * inside)[:, None]
+        metric = self._lens.metric_at(np.rint(pixels[index]))
+        lamps["metric"], lamps["pixel_sr"] = metric, np.sqrt(metric[:, 0] * metric[:, 2] - metric[:, 1] ** 2)
+        lamps["inside"], lamps["halo_e"] = inside, colour * arrivals["halo_w_m2"][index, None]
         lamps["core_e"] = colour * arrivals["core_w_m2"][index, None]
         profiles = self._spots.halo_profiles(arrivals[index]) / self._lens.rad_per_px**2
         _add_lights(image, lamps, profiles.astype(np.float32), self._table, self._split_px)
@@ -212,7 +217,7 @@ def _add_lights(
     remainder = np.zeros(len(inner_angle2) + 1, dtype=np.float32)
     for k in range(len(lamps)):
         lamp, halo = lamps[k], lamps[k].halo
-        if max(lamp.halo_e.max(), lamp.core_e.max()) < _LEAST_E:
+        if max(lamp.halo_e.max() * abs(lamp.inside), lamp.core_e.max()) < _LEAST_E:
             continue
         level, curve, profile = np.float32(halo.level), np.float32(halo.curve), profiles[k]
         for i in range(len(inner_angle2)):
@@ -228,7 +233,10 @@ def _add_lights(
 def _add_remainder(
     image: NDArray[np.float32], lamp: _Fine, table: NDArray[np.float32], scale: np.float32, reach: int
 ) -> None:
-    """Add the remainder `table` of a lamp's halo within `reach` pixels, scaled to the electrons that it holds."""
+    """Add the remainder `table` of a lamp's halo within `reach` pixels, scaled to the electrons that it holds.
+
+    The scale is near 1; it is kept from 0.5 to 2, since the remainder of a halo that is flat has no light to go by.
+    """
     x, y, metric = lamp.pixel[0], lamp.pixel[1], lamp.metric
     beyond, side = len(table) - 1, 2 * reach + 1
     left, top = round(x) - reach, round(y) - reach
@@ -250,7 +258,9 @@ def _add_remainder(
             patch[j, i] = value
             line += value
         total += line
-    share = lamp.halo_e / np.float32(max(total, 1e-30))
+    drawn = total * lamp.pixel_sr
+    near_1 = min(max(lamp.inside / drawn, 0.5), 2.0) if drawn != 0.0 else 1.0
+    share = lamp.halo_e * np.float32(lamp.pixel_sr * near_1)
     for j in range(max(top, 0), min(top + side, image.shape[0])):
         for i in range(max(left, 0), min(left + side, image.shape[1])):
             value = patch[j - top, i - left]

@@ -1,4 +1,4 @@
-"""Scattering by angle: the wide-angle light that a small-angle theory leaves out."""
+"""Scattering by angle: Fournier and Forand's phase function."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.numeric.compiled import compiled
 
-__all__ = ["fournier_forand", "wells_phase", "wide_angle_phase"]
+__all__ = ["fournier_forand"]
 
 _INDEX, _SLOPE = 1.10, 3.5835
 """Refractive index and Junge slope with which it has Petzold's average backscattering (Mobley et al. 2002)."""
-
-_ONSET_RAD = 0.5
 
 
 @compiled
@@ -42,28 +40,3 @@ def fournier_forand(angle_rad: Array, index: float = _INDEX, slope: float = _SLO
         tail = (1.0 - back) / (16.0 * math.pi * (scale - 1.0) * back) * (3.0 * math.cos(angle_rad[i]) ** 2 - 1.0)
         phase[i] = head + tail
     return phase
-
-
-@compiled
-def wells_phase(angle_rad: Array, theta0_rad: float) -> Array:
-    """(n,) phase function in 1/sr behind Wells' (1973) transfer function: θ0 / (2π (β² + θ0²)^{3/2})."""
-    phase = np.empty(len(angle_rad))
-    for i in range(len(angle_rad)):
-        phase[i] = theta0_rad / (2.0 * math.pi * (angle_rad[i] ** 2 + theta0_rad**2) ** 1.5)
-    return phase
-
-
-@compiled
-def wide_angle_phase(angle_rad: Array, theta0_rad: float) -> Array:
-    """(n,) what Fournier and Forand's function has beyond Wells' at wide angles, in 1/sr.
-
-    It sets in by 1 - e^{-(β / 0.5 rad)^4}, at some 30° (ours): below, Wells' θ0 stands for the forward peak as a whole.
-    The excess is 10 % of all scattering for θ0 = 0.02, 5 % for 0.05.
-    """
-    safe = np.empty(len(angle_rad))
-    for i in range(len(safe)):
-        safe[i] = max(angle_rad[i], 1e-3)
-    excess, narrow = fournier_forand(safe), wells_phase(safe, theta0_rad)
-    for i in range(len(excess)):
-        excess[i] = max(excess[i] - narrow[i], 0.0) * -math.expm1(-((angle_rad[i] / _ONSET_RAD) ** 4))
-    return excess

@@ -24,6 +24,7 @@ import numpy as np
 
 from auvdock.core.arrays import Array
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
+from auvdock.numeric.compiled import compiled
 from auvdock.optics.arrival import Lamp
 from auvdock.optics.beam_spread import beam_spread
 from auvdock.optics.light import beam_profile
@@ -38,8 +39,11 @@ _STEPS = (np.arange(_PIECES + 1) / _PIECES) ** 1.5
 """The pieces' borders in the logarithm of the scattering angle: fine by the lamp."""
 _AT_LAMP = 0.35
 """Up to this share of the first piece, light counts as from the lamp itself."""
-_TURN_STEPS = np.linspace(0.0, 1.0, 97)
+_TURNS = 97
 _LEAST_LEAD_RAD = 1e-6
+_TURN_RAD = np.geomspace(_LEAST_LEAD_RAD, math.pi, 512)
+"""Angles at which the phase function is kept."""
+_FIRST_LOG_TURN, _LAST_LOG_TURN = math.log(_LEAST_LEAD_RAD), math.log(math.pi)
 _REACH_RAD = 1.7
 """A little more than a camera's diagonal."""
 _TURN_NODES, _TURN_WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -67,6 +71,7 @@ class RotatingLight:
         self._halo = lights.halo
         self._spread = beam_spread(self._halo, self.halo_row, half)
         self._sigma = half / math.sqrt(2.0 * math.log(2.0))
+        self._log_phase = np.log(self._halo.phase_per_sr(_TURN_RAD))
         self._near2 = 2.0 / math.pi * self._sigma**2
         self._peak, self._a, self._b = own.peak_w_sr, own.absorption_per_m, own.scattering_per_m
         self._cos_elevation = math.cos(math.radians(cfg.elevation_deg))
@@ -119,12 +124,14 @@ class RotatingLight:
         phi = edge[:-1, None] + step[:, None] * (np.arange(_NODES) + 0.5)
         opening = np.sin(apart + phi)
         s, d = (r * np.sin(phi) / opening).mean(axis=1), (r * math.sin(apart) / opening).mean(axis=1)
-        whole_path = np.array([self._b * r])
-        lead = float(self._spread.lead_rad(whole_path, np.array([angle]))[0])
-        many = float(self._widening_rad(whole_path)[0])
+        lead = float(self._spread.lead_rad(np.array([self._b * r]), np.array([angle]))[0])
+        depth = self._b * np.append(s, r)
+        # By how much scattering turns light in the mean, the unscattered counted as 0.
+        widening = self._halo.median_rad(depth, self.halo_row) * -np.expm1(-depth)
+        many = float(widening[-1])
         lead *= lead / (lead + many + 1e-9)
-        share = self._shares(edge, max(lead, _LEAST_LEAD_RAD), apart, r)
-        width = np.hypot(self._sigma, self._widening_rad(self._b * s)) * s / d
+        share = _share_along(edge, max(lead, _LEAST_LEAD_RAD), apart, self._a * r, self._log_phase)
+        width = np.hypot(self._sigma, widening[:-1]) * s / d
         middle = phi.mean(axis=1)
         rays = np.cos(middle)[:, None] * ray + np.sin(middle)[:, None] * along
         # What was turned little spreads over the whole path, as a lamp's light does; what was turned much, from there.
@@ -132,18 +139,38 @@ class RotatingLight:
         beam = Beam(angle, ray, along, edge, rays, d, self._b * (r + (d - r) * turned), halo * share, width)
         return beam, halo * (1.0 - float(share.sum()))
 
-    def _widening_rad(self, depth: Array) -> Array:
-        """(n,) angle by which scattering turns light in the mean over b s (n,), the unscattered counted as 0."""
-        return self._halo.median_rad(depth, self.halo_row) * -np.expm1(-depth)
 
-    def _shares(self, edge: Array, lead: float, apart: float, r: float) -> Array:
-        """(k,) shares of the scattered light that come from the pieces; the rest is from the lamp itself."""
-        turn = lead * (1.0 + edge[-1] / lead) ** _TURN_STEPS
-        opening = np.sin(apart + turn - lead)
-        way = r * (np.sin(turn - lead) + math.sin(apart)) / opening
-        weight = self._halo.phase_per_sr(turn) * np.exp(-self._a * (way - r)) * turn
-        steps = 0.5 * (weight[1:] + weight[:-1]) * np.diff(np.log(turn))
-        running = np.concatenate([[0.0], np.cumsum(steps)])
-        border = edge.copy()
-        border[0] = _AT_LAMP * edge[1]
-        return np.diff(np.interp(np.log(lead + border), np.log(turn), running)) / running[-1]
+@compiled
+def _share_along(edge: Array, lead: float, apart: float, way_per_a: float, log_phase: Array) -> Array:
+    """(k,) shares of the scattered light that come from the pieces; the rest is from the lamp itself.
+
+    Trapezoids over the logarithm of the scattering angle, from `lead` to what comes from the last border.
+
+    Args:
+        edge: (k + 1,) borders of the pieces, apparent angle from the lamp.
+        lead: at which the light left the lamp.
+        apart: angle between the beam's axis and the line to the camera.
+        way_per_a: a r.
+        log_phase: (n,) logarithm of the phase function at `_TURN_RAD`.
+    """
+    running, share = np.zeros(_TURNS), np.zeros(len(edge))
+    span = math.log(1.0 + edge[-1] / lead)
+    step, per_log = span / (_TURNS - 1), (len(log_phase) - 1) / (_LAST_LOG_TURN - _FIRST_LOG_TURN)
+    before = 0.0
+    for i in range(_TURNS):
+        turn = lead * math.exp(i * step)
+        log_turn = math.log(lead) + i * step
+        place = (log_turn - _FIRST_LOG_TURN) * per_log
+        column = min(max(int(place), 0), len(log_phase) - 2)
+        phase = log_phase[column] + (place - column) * (log_phase[column + 1] - log_phase[column])
+        way = (math.sin(turn - lead) + math.sin(apart)) / math.sin(apart + turn - lead)
+        weight = math.exp(phase + log_turn - way_per_a * (way - 1.0))
+        if i > 0:
+            running[i] = running[i - 1] + 0.5 * (before + weight) * step
+        before = weight
+    for border in range(len(edge)):
+        angle = _AT_LAMP * edge[1] if border == 0 else edge[border]
+        place = min(math.log(1.0 + angle / lead) / step, _TURNS - 1.0)
+        i = min(int(place), _TURNS - 2)
+        share[border] = running[i] + (place - i) * (running[i + 1] - running[i])
+    return (share[1:] - share[:-1]) / running[-1]

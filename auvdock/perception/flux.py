@@ -53,7 +53,8 @@ def spot_flux(frame: Frame, centre_px: Array, disc_rad: float = DISC_RAD) -> Arr
     Flux = Σ over rings of area × (mean - mean of the surroundings) / exposure time, over a disc of `disc_rad`, with the
     ring from 1.4 to 2 radii as surroundings. A saturated core does not count as light: where rings hold saturated
     pixels their mean above the image's background (its median) is extrapolated inwards from the next three rings as an
-    exponential of the radius. That meets Wells' halos at b r from 5 to 16 within a third, as long as the disc's rim is
+    exponential of the radius. In halos by photons, b r from 3.5 to 16, that keeps the flux within a quarter up to twice
+    the exposure at which the middle saturates, and up to half is lost at four times, as long as the disc's rim is
     unsaturated (ours). So the flux of one light keeps its scale while its core goes in and out of saturation; a light
     that is saturated far beyond the disc gives a lower limit.
     """

@@ -30,7 +30,7 @@ def test_one_case_is_core_and_halo(capsys):
     read = load_halo("fournier-forand-0.018").within(7.0, 0.05 / 0.35, np.radians([float(angle) for angle in ANGLES]))
     assert halo == pytest.approx(math.exp(-1.0) * read)
     assert found["wavelength_nm"] == 450.0
-    assert found["flown_today"]["model"] == "Wells 1973"
+    assert found["comparison"]["model"] == "Wells 1973"
 
 
 def test_attenuation_moves_scattering_alone(capsys):

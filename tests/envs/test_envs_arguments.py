@@ -21,7 +21,7 @@ from auvdock.envs.rotating_docking import RotatingDockingEnv
 from auvdock.envs.vehicle_env import VehicleEnv
 from auvdock.episode.config import level_cfg
 
-CONICAL = "auvdock/ConicalDocking-v0"
+CONICAL = "auvdock/ConicalDocking-v1"
 
 
 def test_without_a_fidelity_of_its_own_an_environment_takes_the_configurations() -> None:

@@ -117,10 +117,13 @@ def test_station_time_decides_in_the_beacons_fidelity():
     facing = unit.detect(place(20.0), 0.3, station_time_s=facing_s())
     # Looked at by an eye used to the dark, the beam that points away is still a glow.
     away = other.detect(place(20.0), facing_s(), station_time_s=facing_s() + 1.0)
-    assert len(facing) == 1
     assert facing.flux is not None
     assert away.flux is not None
-    assert np.all(away.flux < 0.01 * facing.flux)
+    flash = int(np.argmax(facing.flux))
+    assert unit.lit.rotating is not None
+    lamp_px = unit.lit.look(place(20.0), 0.3).pixels[unit.lit.rotating.lamp]
+    assert np.linalg.norm(facing.centre_px[flash] - lamp_px) < 3.0
+    assert np.all(away.flux < 0.01 * facing.flux[flash])
 
 
 def test_without_a_rotating_beacon_no_flux():
@@ -139,7 +142,7 @@ def test_both_fidelities_expose_alike():
         unit.detect(place(25.0), k / 30.0)
         cam.take(place(25.0), k / 30.0)
         ratios.append(cam.exposure.sensitivity_s / unit.exposure.sensitivity_s)
-    assert unit.exposure.sensitivity_s < 0.05 * 0.016 * 16.0
+    assert unit.exposure.sensitivity_s < 0.1 * 0.016 * 16.0
     assert 1.0 / 1.5 < np.median(ratios[30:]) < 1.5
 
 

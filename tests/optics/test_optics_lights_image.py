@@ -64,7 +64,14 @@ def test_image_holds_the_light_that_falls_within_it(size, r):
 
 @pytest.mark.parametrize(
     ("name", "attenuation", "r"),
-    [("clear", None, 10.0), ("pool", None, 10.0), ("pool", None, 30.0), ("pool", 1.2, 10.0), ("lake", None, 8.0)],
+    [
+        ("clear", None, 10.0),
+        ("pool", None, 10.0),
+        ("pool", None, 30.0),
+        ("pool", None, 60.0),
+        ("pool", 1.2, 10.0),
+        ("lake", None, 8.0),
+    ],
 )
 def test_picture_and_spots_hold_the_photons_light_within_an_angle(name, attenuation, r):
     """Of the picture, and of the profile that the `beacons` fidelity and planners take, within 0.5°, 2° and 10°."""

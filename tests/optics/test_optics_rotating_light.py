@@ -12,10 +12,12 @@ from auvdock.core.beacons import BeaconLayout
 from auvdock.core.rotating_beacon import RotatingBeaconCfg
 from auvdock.core.transforms import make_transform
 from auvdock.optics.beam_image import BeamImage
+from auvdock.optics.beam_spread import beam_spread
 from auvdock.optics.imaging import ExposureCfg, ImagingCfg, UnderwaterCamera
 from auvdock.optics.light import beam_profile, profile_solid_angle_sr
 from auvdock.optics.nuisance import NuisanceCfg
-from auvdock.optics.phase_function import fournier_forand, wells_phase, wide_angle_phase
+from auvdock.optics.phase_function import fournier_forand
+from auvdock.optics.photons.phase import load_phase
 from auvdock.optics.setup import OpticalSetup
 from auvdock.optics.water import WaterCfg, load_water
 
@@ -195,7 +197,7 @@ def test_elevation_lifts_the_beam():
     assert high["core_w_m2"][lamp] > 10.0 * level["core_w_m2"][lamp]
 
 
-def test_phase_functions_are_normalised():
+def test_phase_function_is_normalised():
     angle = np.geomspace(1e-7, math.pi, 100_001)
     weight = 2.0 * math.pi * np.sin(angle)
     forand = fournier_forand(angle)
@@ -203,9 +205,38 @@ def test_phase_functions_are_normalised():
     back = angle > math.pi / 2.0
     # Mobley et al. (2002): 1.83 % backscattering, Petzold's average.
     assert np.trapezoid((forand * weight)[back], angle[back]) == pytest.approx(0.0183, abs=2e-4)
-    plane = np.geomspace(1e-7, 1e4, 100_001)
-    assert np.trapezoid(wells_phase(plane, 0.02) * 2.0 * math.pi * plane, plane) == pytest.approx(1.0, abs=1e-3)
-    excess = wide_angle_phase(angle, 0.02)
-    assert np.all(excess >= 0.0)
-    assert np.trapezoid(excess * weight, angle) == pytest.approx(0.098, abs=0.002)
-    assert wide_angle_phase(np.zeros(0), 0.02).shape == (0,)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 6.0, 30.0, 100.0])
+def test_lamp_and_pieces_hold_the_beams_scattered_light(degrees):
+    unit, r = eye(), 20.0
+    view = unit.lit.look(place(r), off(degrees))
+    assert view.beam is not None
+    total = float(view.arrivals["halo_w_m2"][lamp_of(unit)] + view.beam.light_w_m2.sum())
+    table, br = unit.lit.lights.halo, np.array([0.35 * r])
+    share = beam_spread(table, 0, math.radians(5.0)).share(br, np.radians([degrees]))[0]
+    peak = 30.0 * 0.35 / profile_solid_angle_sr(10.0)
+    expected = peak * math.exp(-0.05 * r) / r**2 * table.scattered(br, 0)[0] * share
+    assert total == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("degrees", [40.0, 90.0, 130.0])
+def test_seen_from_the_side_light_comes_from_along_the_beam(degrees):
+    """In thin water by single scattering: between φ1 and φ2 off the lamp ∫ p(θ + φ) e^{-a (s + d)} dφ."""
+    thin, r = WaterCfg("thin", "test", (0.02, 0.02, 0.02), (0.01, 0.01, 0.01)), 6.0
+    unit = eye(thin, beacon=dataclasses.replace(BEACON, divergence_deg=2.0))
+    view = unit.lit.look(place(r), off(degrees))
+    assert view.beam is not None
+    theta = math.radians(degrees)
+    phase, edge = load_phase("fournier-forand-0.018"), view.beam.edge_rad
+
+    def between(first, last):
+        phi = np.linspace(first, last, 2000)
+        way = r * (np.sin(phi) + math.sin(theta)) / np.sin(theta + phi)
+        return float(np.trapezoid(phase.density(theta + phi) * np.exp(-0.02 * way), phi))
+
+    whole = between(0.0, float(edge[-1]))
+    light = view.beam.light_w_m2
+    total = float(light.sum() + view.arrivals["halo_w_m2"][lamp_of(unit)])
+    for k in range(1, len(light)):
+        assert light[k] / total == pytest.approx(between(float(edge[k]), float(edge[k + 1])) / whole, abs=0.02)

@@ -1,8 +1,8 @@
 """How bright a rotating beacon looks while its beam sweeps past: the pass profile, one family over all waters.
 
 A beam of full angle D (half of the peak intensity) is a Gaussian of σ_b = D / 2 / √(2 ln 2). Scattering widens it and
-gives it wings. What Wells' (1973) small-angle spread makes of beams of 6° to 10°, with θ0 from 0.02 to 0.05 rad and b r
-from 1 to 25, is met within 2 % of the peak (10°, 0.02 rad: 0.7 %) by
+gives it wings. What it makes of a beam of 10° by single photons (Fournier and Forand's phase function, b r from 0.5 to
+25) is met within 4.5 % of the peak, and what Wells' (1973) small-angle spread would make of it within 2 %, by
 
     g(θ) = (1 + θ² / (2 β w²))^-β,    w = x σ_b,    β = 1.5 + 0.42 / (x - 1),
 
