@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray
-from auvdock.experiments.halo_check import READ, WELLS_RAD, mean_and_error
+from auvdock.experiments.halo_check import HALF_ANGLES_DEG, READ, WELLS_RAD, mean_and_error
 from auvdock.optics.beam_spread import beam_spread
 from auvdock.optics.halo import HaloTable, halo_table
+from auvdock.optics.light import beam_profile
 from auvdock.optics.photons.beam import arriving, beam_share, halo_beam
 from auvdock.optics.photons.beam_walk import ARRIVAL_DEG, LEFT_DEG, BeamTally
 from auvdock.optics.photons.table import load_halo
@@ -52,11 +53,18 @@ class BeamCheck:
     """All light that arrives, by reciprocity from the table of the halo."""
     wells: Array
     """(θ0, b r, off axis) all light that arrives by what is flown, which knows no a / b."""
+    lamp: Array
+    """(n, k, j, 8) as `within`: f(θ) times the isotropic lamp's halo by the table, as fixed lamps have it."""
 
     @property
     def judged(self) -> BoolArray:
         """Where three standard errors of the photons are 10 % or less."""
         return self.error <= 0.1 / 3.0
+
+    @property
+    def within_judged(self) -> BoolArray:
+        """The same for the light within half angles."""
+        return self.within_error <= 0.1 / 3.0
 
     @property
     def front_judged(self) -> BoolArray:
@@ -81,6 +89,9 @@ def check_beam(name: str, batches: Sequence[BeamTally], beam_deg: float, off_axi
     within, within_error = mean_and_error([one[..., READ] for one in light])
     halo, radius, absorption = load_halo(name), batches[0].radius, batches[0].absorption
     table = [[halo_beam(halo, float(br), float(x), beam_deg, angle) for x in absorption] for br in radius]
+    alike = np.array(
+        [[halo.within(float(br), float(x), np.radians(HALF_ANGLES_DEG)) for x in absorption] for br in radius]
+    )
     wells = [[flown_beam(halo_table(theta0), float(br), beam_deg, angle) for br in radius] for theta0 in WELLS_RAD]
     return BeamCheck(
         name,
@@ -95,6 +106,7 @@ def check_beam(name: str, batches: Sequence[BeamTally], beam_deg: float, off_axi
         within_error,
         np.array(table),
         np.array(wells),
+        alike[:, :, None, :] * beam_profile(angle, beam_deg)[:, None],
     )
 
 

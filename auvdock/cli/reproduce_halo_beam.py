@@ -27,6 +27,9 @@ BEAM_DEFINITION = (
 )
 
 
+_SHOWN_DEG = (1.0, 10.0, 40.0)
+
+
 def read_degrees(name: str, words: Sequence[str], low: float, high: float) -> tuple[float, ...]:
     """Angles given with commas or spaces between them.
 
@@ -85,6 +88,7 @@ def _case(water: WaterCfg, case: HaloCase, check: BeamCheck) -> dict[str, Any]:
                 "scattered_as_flown": float(flown[j]),
                 "within": _by_angle(core + within),
                 "halo_within": _by_angle(within),
+                "isotropic_halo_times_profile": _by_angle(left * check.lamp[0, 0, j]),
                 "halo_standard_error": _by_angle(check.within_error[0, 0, j]),
             }
         )
@@ -96,6 +100,7 @@ def beam_verdict(check: BeamCheck) -> dict[str, Any]:
     judged, front = check.judged, check.front_judged
     off = np.abs(check.table / check.fresh - 1.0)
     flown = check.wells[:, :, None, :] / check.fresh
+    lamp, known = check.lamp / check.within, check.within_judged
     return {
         "beam_deg": check.beam_deg,
         "off_axis_deg": list(check.off_axis_deg),
@@ -111,6 +116,11 @@ def beam_verdict(check: BeamCheck) -> dict[str, Any]:
             {"scattering_angle_rad": theta0, "off_axis_deg": degrees} | _range(ratio[..., j], judged[..., j])
             for theta0, ratio in zip(WELLS_RAD, flown, strict=True)
             for j, degrees in enumerate(check.off_axis_deg)
+        ],
+        "isotropic_halo_times_profile_over_photons": [
+            {"off_axis_deg": degrees, "half_angle_deg": half_angle} | _range(lamp[:, :, j, m], known[:, :, j, m])
+            for j, degrees in enumerate(check.off_axis_deg)
+            for m, half_angle in enumerate(HALF_ANGLES_DEG)
         ],
     }
 
@@ -161,6 +171,20 @@ def print_beams(rows: Sequence[dict[str, Any]]) -> None:
                 spans = [r for r in beam["flown_today_over_photons"] if r["scattering_angle_rad"] == theta0]
                 table.add_row(row["phase"], f"{beam['beam_deg']:g}°", *(_span(one) for one in spans))
         console.print(table)
+
+    title = "fixed lamps, f(θ) times the isotropic halo by the table, over fresh photons: light within a half angle"
+    table = Table(title=title, title_justify="left")
+    for name in ("phase function", "beam", "within"):
+        table.add_column(name)
+    for degrees in rows[0]["beams"][0]["off_axis_deg"]:
+        table.add_column(f"{degrees:g}° off", justify="right")
+    for row in rows:
+        for beam in row["beams"]:
+            found = beam["isotropic_halo_times_profile_over_photons"]
+            for half_angle in _SHOWN_DEG:
+                spans = [_span(one) for one in found if one["half_angle_deg"] == half_angle]
+                table.add_row(row["phase"], f"{beam['beam_deg']:g}°", f"{half_angle:g}°", *spans)
+    console.print(table)
 
 
 def _range(ratio: Array, judged: BoolArray) -> dict[str, float | None]:

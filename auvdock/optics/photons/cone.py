@@ -24,7 +24,7 @@ _NODES = 256
 
 
 def cone_table(phase: PhaseFunction, log_sine: Array, place: Array) -> Array:
-    """(n, m) share that is scattered into a cone, to 0.1 %.
+    """(n, m) share that is scattered into a cone, to 0.2 %.
 
     Args:
         phase: what scatters.
