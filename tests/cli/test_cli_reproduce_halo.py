@@ -98,8 +98,11 @@ def test_a_beam_in_one_case(capsys):
         off_by = abs(row["scattered"] / row["scattered_by_table"] - 1.0)
         assert off_by < 5.0 * row["scattered_standard_error"] + 0.01
         assert row["scattered_in_front"] < row["scattered"]
-    # An isotropic lamp is no darker.
+    # An isotropic lamp is no darker; what a fixed lamp is given is that times its profile.
     assert on["halo_within"]["40"] < found["halo_within"]["40"]
+    for row, profile in ((on, 1.0), (off, 0.5)):
+        given = [row["isotropic_halo_times_profile"][angle] for angle in ANGLES]
+        assert given == pytest.approx([profile * found["halo_within"][angle] for angle in ANGLES])
 
 
 @pytest.mark.parametrize(
