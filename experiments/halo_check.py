@@ -3,21 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from auvdock.core.arrays import Array, BoolArray
 from auvdock.core.errors import ConfigError
-from auvdock.optics.photons.making import left_after, ring_radiance
+from auvdock.optics.photons.beam import arriving
+from auvdock.optics.photons.beam_walk import ARRIVAL_DEG, LEFT_DEG, BeamTally, shoot_beams
+from auvdock.optics.photons.making import BATCHES
 from auvdock.optics.photons.phase import load_phase
 from auvdock.optics.photons.table import load_halo, photon_halo_of
-from auvdock.optics.photons.walk import Tally, shoot
 from auvdock.optics.water import WaterCfg
 from auvdock.optics.wells import wells_halo
 
-__all__ = ["CHECKED_A_B", "CHECKED_BR", "HALF_ANGLES_DEG", "PHASES", "HaloCase", "HaloCheck", "check_halo", "halo_case"]
+__all__ = [
+    "CHECKED_A_B",
+    "CHECKED_BR",
+    "HALF_ANGLES_DEG",
+    "PHASES",
+    "READ",
+    "WELLS_RAD",
+    "HaloCase",
+    "HaloCheck",
+    "check_halo",
+    "halo_case",
+    "mean_and_error",
+    "send_batches",
+    "send_photons",
+]
 
 PHASES = ("fournier-forand-0.018", "petzold-coastal", "petzold-harbour")
 """Phase functions of the check."""
@@ -30,8 +45,8 @@ HALF_ANGLES_DEG = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0)
 WELLS_RAD = (0.02, 0.03, 0.05)
 """θ0 of the pool, of clear water, of all others."""
 
-_EDGES_DEG = (0.2, 0.5, 1.0, 2.0, 5.0, *np.arange(10.0, 41.0, 2.5).tolist(), 90.0)
-_BATCHES = 10
+READ = [ARRIVAL_DEG.index(degrees) for degrees in HALF_ANGLES_DEG]
+"""Where the half angles stand among the photons' bins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,47 +82,54 @@ class HaloCheck:
         return self.table / self.fresh
 
 
-def check_halo(name: str, photons: int, seed: int, told: Callable[[], object]) -> HaloCheck:
-    """Send photons through a phase function and read its table at the same places.
+def send_photons(name: str, photons: int, seed: int, told: Callable[[], object]) -> list[BeamTally]:
+    """Photons through a phase function at `CHECKED_BR` and `CHECKED_A_B`, in ten batches of the same size.
 
     Args:
         name: of the phase function.
-        photons: how many, in ten batches of the same size.
-        seed: other than the table's, which is 0.
+        photons: how many.
+        seed: of their own stream, which is no table's.
         told: called after each batch.
     """
-    phase, angle = load_phase(name), np.radians(_EDGES_DEG)
-    angle[-1] = math.pi / 2.0
-    batches: list[Array] = []
-    for rng in np.random.default_rng([seed, 1]).spawn(_BATCHES):
-        batches.append(_within(shoot(phase, photons // _BATCHES, np.array(CHECKED_BR), angle, rng)))
+    return send_batches(name, photons, seed, (np.array(CHECKED_BR), np.array(CHECKED_A_B)), told)
+
+
+def send_batches(
+    name: str, photons: int, seed: int, at: tuple[Array, Array], told: Callable[[], object]
+) -> list[BeamTally]:
+    """As `send_photons`, at b r (n,) and a / b (k,)."""
+    br, absorption = at
+    phase, outer = load_phase(name), max(60.0, 1.5 * float(br.max()))
+    batches: list[BeamTally] = []
+    for rng in np.random.default_rng([seed, 1]).spawn(BATCHES):
+        batches.append(shoot_beams(phase, photons // BATCHES, br, absorption, rng, outer))
         told()
-    wanted = [_EDGES_DEG.index(degrees) for degrees in HALF_ANGLES_DEG]
-    stack = np.array(batches)[..., wanted]
-    fresh = stack.mean(axis=0)
+    return batches
+
+
+def mean_and_error(batches: Sequence[Array]) -> tuple[Array, Array]:
+    """Mean of batches and its standard error relative to it, infinite where the mean is 0."""
+    mean = np.mean(batches, axis=0)
     with np.errstate(invalid="ignore"):
-        error = stack.std(axis=0, ddof=1) / math.sqrt(_BATCHES) / fresh
+        error = np.std(batches, axis=0, ddof=1) / math.sqrt(len(batches)) / mean
+    return mean, np.nan_to_num(error, nan=np.inf)
+
+
+def check_halo(name: str, batches: Sequence[BeamTally]) -> HaloCheck:
+    """Hold the table of a phase function and Wells' function to photons at the same places.
+
+    Args:
+        name: of the phase function.
+        batches: of `send_photons`.
+    """
+    alike = np.ones((len(LEFT_DEG), 1))
+    fresh, error = mean_and_error([arriving(tally, alike)[:, :, 0, READ] for tally in batches])
     halo, read = load_halo(name), np.radians(HALF_ANGLES_DEG)
     table = [[halo.within(br, x, read) for x in CHECKED_A_B] for br in CHECKED_BR]
     table_error = [[halo.standard_error(br, x, read) for x in CHECKED_A_B] for br in CHECKED_BR]
     wells = [wells_halo(theta0).encircled(np.array(CHECKED_BR), read) for theta0 in WELLS_RAD]
-    return HaloCheck(
-        name,
-        photons // _BATCHES * _BATCHES,
-        fresh,
-        np.nan_to_num(error, nan=np.inf),
-        np.array(table),
-        np.array(table_error),
-        np.array(wells),
-    )
-
-
-def _within(tally: Tally) -> Array:
-    """(n, k, m) halo within the tally's angles for `CHECKED_A_B`."""
-    facing, solid = ring_radiance(tally.angle_rad)
-    counts = (tally.once + tally.more).astype(float)
-    crossed = np.einsum("nme,ke->nkm", counts, left_after(np.array(CHECKED_A_B)), optimize=True)
-    return np.cumsum(crossed / tally.photons * (solid / facing), axis=-1)
+    photons = sum(tally.photons for tally in batches)
+    return HaloCheck(name, photons, fresh, error, np.array(table), np.array(table_error), np.array(wells))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,12 @@ from matplotlib.figure import Figure
 from auvdock.experiments.halo_check import CHECKED_A_B, CHECKED_BR, HALF_ANGLES_DEG, WELLS_RAD, HaloCheck
 from auvdock.planning.pictures import save_figure
 
-__all__ = ["draw_halo"]
+__all__ = ["COLOURS", "SHOWN_BR", "draw_halo"]
 
-_SHOWN = (0.5, 2.0, 5.0, 10.0, 20.0)
-_COLOURS = ("#9dc3e6", "#5b9bd5", "#2e75b6", "#1f4e79", "#0f2540")
+SHOWN_BR = (0.5, 2.0, 5.0, 10.0, 20.0)
+"""b r of the curves shown."""
+COLOURS = ("#9dc3e6", "#5b9bd5", "#2e75b6", "#1f4e79", "#0f2540")
+"""Theirs."""
 
 
 def draw_halo(path: Path, checks: Sequence[HaloCheck]) -> None:
@@ -43,7 +45,7 @@ def draw_halo(path: Path, checks: Sequence[HaloCheck]) -> None:
 
 def _light(panel: Axes, check: HaloCheck, ratio: int) -> None:
     panel.set_title(f"{check.phase}, {check.photons:,} photons", fontsize=10)
-    for br, colour in zip(_SHOWN, _COLOURS, strict=True):
+    for br, colour in zip(SHOWN_BR, COLOURS, strict=True):
         i = CHECKED_BR.index(br)
         fresh, error = check.fresh[i, ratio], check.error[i, ratio]
         known = np.isfinite(error)
@@ -64,7 +66,7 @@ def _ratios(panel: Axes, check: HaloCheck) -> None:
             judged = check.judged[i, j]
             shift = 1.0 + 0.02 * (i - 4)
             angle = np.array(HALF_ANGLES_DEG) * shift
-            colour = _COLOURS[min(int(np.searchsorted(_SHOWN, br)), 4)]
+            colour = COLOURS[min(int(np.searchsorted(SHOWN_BR, br)), 4)]
             panel.plot(angle[judged], check.ratio[i, j][judged], "o", color=colour, ms=2.5)
             panel.plot(angle[~judged], check.ratio[i, j][~judged], "x", color="#bbbbbb", ms=3)
     panel.set_ylim(0.75, 1.25)
@@ -73,11 +75,11 @@ def _ratios(panel: Axes, check: HaloCheck) -> None:
 
 def _wells(panel: Axes, check: HaloCheck, ratio: int) -> None:
     panel.axhspan(0.9, 1.1, color="#e8f0e4")
-    for br, colour in zip(_SHOWN, _COLOURS, strict=True):
+    for br, colour in zip(SHOWN_BR, COLOURS, strict=True):
         i = CHECKED_BR.index(br)
         judged = check.judged[i, ratio]
         for theta0, wells, style in zip(WELLS_RAD, check.wells, ("-", ":", "--"), strict=True):
-            label = f"θ0 = {theta0:g}" if br == _SHOWN[0] else None
+            label = f"θ0 = {theta0:g}" if br == SHOWN_BR[0] else None
             values = np.where(judged, wells[i] / check.fresh[i, ratio], np.nan)
             panel.plot(HALF_ANGLES_DEG, values, style, color=colour, lw=1.2, label=label)
     panel.set_yscale("log")

@@ -16,9 +16,12 @@ from rich.table import Table
 from auvdock.cli import exit_codes
 from auvdock.cli.console import counting_progress, output
 from auvdock.cli.parsing import named_by_flag, parse
+from auvdock.cli.reproduce_halo_beam import beam_cases, beam_verdict, print_beam_case, print_beams, read_degrees
 from auvdock.cli.saving import Saving
 from auvdock.core.arrays import Array
 from auvdock.core.errors import ConfigError
+from auvdock.experiments.beam_check import BeamCheck, check_beam
+from auvdock.experiments.beam_picture import draw_beams
 from auvdock.experiments.halo_check import (
     CHECKED_BR,
     HALF_ANGLES_DEG,
@@ -27,6 +30,7 @@ from auvdock.experiments.halo_check import (
     HaloCheck,
     check_halo,
     halo_case,
+    send_photons,
 )
 from auvdock.experiments.halo_picture import draw_halo
 from auvdock.optics.photons.making import BATCHES, count_photons, make_grid
@@ -49,6 +53,7 @@ class Halo:
     """Light scattered about a lamp: a table made by single photons against photons sent out afresh, and Wells' model.
 
     With --water and --range it tells what arrives in that one case. With --make-table it makes tables instead.
+    With --beam-deg narrow beams are checked too.
     Exit code: 1 if the table is off by more than 10 % where the fresh photons can tell, or they never can; else 0.
     """
 
@@ -62,6 +67,10 @@ class Halo:
     """In place of --water: c at 530 nm in 1/m of a water between those that Petzold measured."""
     wavelength_nm: float = 450.0
     """Of the lamp in that one case; by default the blue lamps'."""
+    beam_deg: tuple[str, ...] = ()
+    """Full angles of narrow beams, as 10,60: what they scatter against photons, in one case or in all of the check."""
+    off_axis_deg: tuple[str, ...] = ("0,5,10,20,40",)
+    """Angles of the line of sight with such a beam's axis."""
     phases: tuple[str, ...] | None = None
     """Phase functions; by default fournier-forand-0.018, petzold-coastal and petzold-harbour."""
     photons: int = 1_000_000
@@ -71,7 +80,7 @@ class Halo:
     make_table: Path | None = None
     """Folder for a new table of each phase function: PHASE.npz."""
     out: Path | None = None
-    """Folder for halo.png, the picture."""
+    """Folder for halo.png, the picture, and beam.png with --beam-deg."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -79,15 +88,18 @@ class Halo:
 def run_halo(argv: Sequence[str], prog: str) -> int:
     """Run the command."""
     args = parse(Halo, argv, prog)
-    if args.water is not None or args.turbidity is not None:
-        return _case(args)
-    for name in ("range_m", "attenuation"):
-        if getattr(args, name) is not None:
-            raise ConfigError(name.removesuffix("_m"), getattr(args, name), "goes with --water NAME, for one case")
     if not _LEAST_PHOTONS <= args.photons <= _MOST_PHOTONS:
         raise ConfigError("photons", args.photons, f"{_LEAST_PHOTONS} to {_MOST_PHOTONS}")
     if args.seed < 0:
         raise ConfigError("seed", args.seed, "0 or more")
+    # What a photon left at is known to half a degree.
+    beams = read_degrees("beam_deg", args.beam_deg, 4.0, 360.0) if args.beam_deg else ()
+    off_axis = read_degrees("off_axis_deg", args.off_axis_deg, 0.0, 180.0)
+    if args.water is not None or args.turbidity is not None:
+        return _case(args, beams, off_axis)
+    for name in ("range_m", "attenuation"):
+        if getattr(args, name) is not None:
+            raise ConfigError(name.removesuffix("_m"), getattr(args, name), "goes with --water NAME, for one case")
     phases = args.phases or PHASES
     for phase in phases:
         load_phase(phase)
@@ -98,6 +110,7 @@ def run_halo(argv: Sequence[str], prog: str) -> int:
         make_folder(folder)
     saving = Saving()
     checks: list[HaloCheck] = []
+    narrow: list[list[BeamCheck]] = []
     with counting_progress() as progress:
         for phase in phases:
             task = progress.add_task(f"photons in {phase}", total=BATCHES)
@@ -106,23 +119,33 @@ def run_halo(argv: Sequence[str], prog: str) -> int:
                 grid = make_grid(phase, count_photons(load_phase(phase), args.photons, args.seed, told))
                 saving.attempt(args.make_table / f"{phase}.npz", partial(save_halo, grid))
             else:
-                checks.append(check_halo(phase, args.photons, args.seed, told))
+                batches = send_photons(phase, args.photons, args.seed, told)
+                checks.append(check_halo(phase, batches))
+                narrow.append([check_beam(phase, batches, beam_deg, off_axis) for beam_deg in beams])
     if args.make_table is not None:
         sizes = {Path(table).stem: Path(table).stat().st_size for table in saving.written}
         _tell(args, {"photons": args.photons, "bytes": sizes}, [f"{p}.npz: {n} bytes" for p, n in sizes.items()])
         return saving.finish(exit_codes.DONE)
     if args.out is not None:
         saving.attempt(args.out / "halo.png", lambda path: draw_halo(path, checks))
-    rows = [_verdict(check) for check in checks]
+        if beams:
+            saving.attempt(args.out / "beam.png", lambda path: draw_beams(path, narrow))
+    rows: list[dict[str, Any]] = [
+        _verdict(check) | {"beams": [beam_verdict(beam) for beam in found]}
+        for check, found in zip(checks, narrow, strict=True)
+    ]
     if args.json:
         print(json.dumps({"target": 0.1, "phases": rows}, allow_nan=False))
     else:
         _print(rows)
-    good = all(row["judged"] and row["greatest_deviation"] <= 0.1 for row in rows)
+        if beams:
+            print_beams(rows)
+    verdicts = [verdict for row in rows for verdict in (row, *row["beams"])]
+    good = all(verdict["judged"] and verdict["greatest_deviation"] <= 0.1 for verdict in verdicts)
     return saving.finish(exit_codes.DONE if good else exit_codes.NOT_MET)
 
 
-def _case(args: Halo) -> int:
+def _case(args: Halo, beams: Sequence[float], off_axis: tuple[float, ...]) -> int:
     if args.range_m is None:
         raise ConfigError("range", None, "--range M, the distance to the lamp")
     if args.water is not None and args.turbidity is not None:
@@ -131,6 +154,11 @@ def _case(args: Halo) -> int:
         water = water_of(args.water or "", args.attenuation, args.turbidity)
     name = args.water or water.name
     case = halo_case(water, args.range_m, args.wavelength_nm)
+    narrow: list[dict[str, Any]] = []
+    if beams:
+        with counting_progress() as progress:
+            told = partial(progress.advance, progress.add_task("photons", total=BATCHES))
+            narrow = beam_cases(water, case, beams, off_axis, (args.photons, args.seed, told))
     halo, wells = _by_angle(case.halo), _by_angle(case.wells)
     plain = {
         "water": name,
@@ -152,6 +180,7 @@ def _case(args: Halo) -> int:
             "within": _by_angle(case.core + case.wells),
             "halo_within": wells,
         },
+        "beams": narrow,
     }
     if args.json:
         print(json.dumps(plain, allow_nan=False))
@@ -177,6 +206,8 @@ def _case(args: Halo) -> int:
         )
     console.print(table)
     console.print(f"{_DEFINITION}; the simulator flies the table; Wells (1973) is for comparison", highlight=False)
+    for beam in narrow:
+        print_beam_case(beam)
     return 0
 
 

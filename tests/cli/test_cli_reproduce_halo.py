@@ -62,13 +62,61 @@ def test_thin_water_is_single_scattering(capsys):
 
 def test_a_small_check_says_what_it_could_judge(capsys, tmp_path):
     code, found = run_json(
-        capsys, "--phases", "fournier-forand-0.018", "--photons", "10000", "--seed", "4", "--out", str(tmp_path)
+        capsys,
+        *("--phases", "fournier-forand-0.018", "--photons", "10000", "--seed", "4", "--out", str(tmp_path)),
+        *("--beam-deg", "10,60", "--off-axis-deg", "0,10,20"),
     )
     (row,) = found["phases"]
     assert 0 < row["judged"] < row["readings"]
     assert row["rms_deviation"] < 0.05
-    assert code == (0 if row["greatest_deviation"] <= 0.1 else 1)
-    assert (tmp_path / "halo.png").stat().st_size > 20_000
+    narrow, wide = row["beams"]
+    assert (narrow["beam_deg"], wide["beam_deg"]) == (10.0, 60.0)
+    assert narrow["readings"] == 9 * 5 * 3
+    for beam in (narrow, wide):
+        assert beam["judged"] > 60
+        assert beam["rms_deviation"] < 0.04
+        pool = [found for found in beam["wells_over_photons"] if found["scattering_angle_rad"] == 0.02]
+        assert [found["off_axis_deg"] for found in pool] == [0.0, 10.0, 20.0]
+        assert all(found["least"] < found["most"] for found in pool)
+    good = all(verdict["greatest_deviation"] <= 0.1 for verdict in (row, narrow, wide))
+    assert code == (0 if good else 1)
+    for picture in ("halo.png", "beam.png"):
+        assert (tmp_path / picture).stat().st_size > 20_000
+
+
+def test_a_beam_in_one_case(capsys):
+    words = [
+        "--water",
+        "clear",
+        "--range",
+        "0.5",
+        "--beam-deg",
+        "60",
+        "--off-axis-deg",
+        "0",
+        "30",
+        "--photons",
+        "40000",
+    ]
+    _, found = run_json(capsys, *words)
+    (beam,) = found["beams"]
+    on, off = beam["off_axis"]
+    assert (on["off_axis_deg"], off["off_axis_deg"]) == (0.0, 30.0)
+    # At half the beam's angle half the light, little as it is scattered.
+    assert off["core"] == pytest.approx(0.5 * on["core"])
+    assert on["core"] == pytest.approx(found["core"])
+    assert list(on["within"]) == ANGLES
+    for row in (on, off):
+        for angle in ANGLES:
+            assert row["within"][angle] - row["halo_within"][angle] == pytest.approx(row["core"])
+        off_by = abs(row["scattered"] / row["scattered_by_table"] - 1.0)
+        assert off_by < 5.0 * row["scattered_standard_error"] + 0.01
+        assert row["scattered_in_front"] < row["scattered"]
+    # An isotropic lamp is no darker; what a fixed lamp is given is that times its profile.
+    assert on["halo_within"]["40"] < found["halo_within"]["40"]
+    for row, profile in ((on, 1.0), (off, 0.5)):
+        given = [row["isotropic_halo_times_profile"][angle] for angle in ANGLES]
+        assert given == pytest.approx([profile * found["halo_within"][angle] for angle in ANGLES])
 
 
 @pytest.mark.parametrize(
@@ -88,6 +136,9 @@ def test_a_small_check_says_what_it_could_judge(capsys, tmp_path):
         ["--range", "5"],
         ["--photons", "3"],
         ["--seed", "-1"],
+        ["--beam-deg", "2"],
+        ["--beam-deg", "10,x"],
+        ["--beam-deg", "10", "--off-axis-deg", "-5"],
         ["--phases", "henyey"],
         ["--phases", "fournier-forand-0.03"],
     ],

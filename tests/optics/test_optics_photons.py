@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from auvdock.assets import asset
 from auvdock.core.errors import ConfigError
 from auvdock.core.strict import load_toml
+from auvdock.numeric.scattering import turn_of
 from auvdock.optics.phase_function import fournier_forand
 from auvdock.optics.photons.making import left_after, ring_radiance
 from auvdock.optics.photons.mixture import mixture_name, shares_of
 from auvdock.optics.photons.phase import MeasuredPhase, load_phase, phase_names
 from auvdock.optics.photons.single import SingleScattering
-from auvdock.optics.photons.walk import shoot, turn_of
+from auvdock.optics.photons.walk import shoot
 
 FORAND = "fournier-forand-0.018"
 RADIUS = np.array([0.1, 0.5, 1.0, 2.0, 3.0])

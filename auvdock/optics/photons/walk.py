@@ -19,16 +19,15 @@ import numpy as np
 
 from auvdock.core.arrays import Array, IntArray
 from auvdock.numeric.compiled import compiled
+from auvdock.numeric.scattering import turn_of
 from auvdock.optics.photons.phase import PhaseFunction
 
-__all__ = ["EXCESS_EDGES", "Tally", "shoot", "turn_of"]
+__all__ = ["EXCESS_EDGES", "Tally", "shoot"]
 
 EXCESS_EDGES = np.geomspace(1e-5, 1e3, 129)
 """(129,) edges of the bins of excess path e, in units of 1/b; below the first and beyond the last counts as in them."""
 
 _MOST_SCATTERINGS = 20_000
-_BY_POWER = 64
-"""Quantiles below this one follow a power law."""
 
 
 @dataclass(frozen=True)
@@ -80,16 +79,6 @@ def shoot(
     bins = np.array([math.log(EXCESS_EDGES[0]), math.log(EXCESS_EDGES[1] / EXCESS_EDGES[0])])
     lost = _walk(photons, phase.quantiles, phase.power, radius, sine2, outer, bins, counts, unscattered, net, rng)
     return Tally(photons, radius, angle_rad, unscattered, counts[0], counts[1], net, lost)
-
-
-@compiled
-def turn_of(share: float, quantiles: Array, power: float) -> float:
-    """1 - cos Θ of the scattering below which a share in [0, 1) of all lie; see `PhaseFunction`."""
-    place = share * (len(quantiles) - 1)
-    cell = int(place)
-    if cell < _BY_POWER:
-        return quantiles[_BY_POWER] * (place / _BY_POWER) ** power
-    return quantiles[cell] + (place - cell) * (quantiles[cell + 1] - quantiles[cell])
 
 
 @compiled
