@@ -60,6 +60,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.reproduce_halo:run_halo",
         "the light about a lamp against single photons",
     ),
+    ("reproduce", "models"): (
+        "auvdock.cli.reproduce_models:run_models",
+        "sizes of the papers' networks and ablation rows beside ours",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("fit-landing",): (
