@@ -1,6 +1,16 @@
 """What the tests of networks share; needs PyTorch."""
 
+from typing import Any
+
+import numpy as np
+import onnxruntime
 import torch
+
+
+def run_onnx(model: bytes, **inputs: torch.Tensor) -> list[np.ndarray[Any, Any]]:
+    """What ONNX Runtime makes of inputs by name."""
+    session = onnxruntime.InferenceSession(model)
+    return [np.asarray(value) for value in session.run(None, {name: x.numpy() for name, x in inputs.items()})]
 
 
 @torch.no_grad()

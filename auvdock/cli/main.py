@@ -70,6 +70,7 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.fit_landing:run",
         "fit the beacons fidelity of a landing to detectors of lights and tags",
     ),
+    ("export",): ("auvdock.cli.export:run", "write a trained network as an ONNX file"),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),
 }
 """Words of a command: where it lives (imported only when asked for) and what it does."""

@@ -39,7 +39,8 @@ class Network(nn.Module):
         self.levels = cfg.head.inputs
         self.stride_px = int(max(strides.values()))
         """Height and width of a picture must be multiples of this."""
-        self.head = Head(cfg.head, [channels[n] for n in self.levels], [int(strides[n]) for n in self.levels])
+        self.channels = tuple(channels[name] for name in self.levels)
+        self.head = Head(cfg.head, self.channels, [int(strides[name]) for name in self.levels])
 
     def features(self, images: Tensor) -> list[Tensor]:
         """What the head reads, from fine to coarse; see `forward` for the images."""
