@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -103,8 +105,7 @@ def _export(
     sizes: tuple[dict[int, Any], ...],
     metadata: dict[str, str],
 ) -> bytes:
-    with warnings.catch_warnings(), torch.no_grad():
-        warnings.simplefilter("ignore")  # of the exporter, about its own future
+    with _quiet(), torch.no_grad():
         program = torch.onnx.export(
             module.eval(),
             sample,
@@ -118,3 +119,16 @@ def _export(
     assert program is not None
     program.model.metadata_props.update(metadata)
     return program.model_proto.SerializeToString()
+
+
+@contextmanager
+def _quiet() -> Generator[None]:
+    """Without what the exporter says of its own future and of packages that it does not find."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(before)
