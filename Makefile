@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(PYTHON) -m pip --python $(BIN)/python --disable-pip-version-check install --quiet --constraint constraints.txt
 ARGS ?=
+EXTRAS ?= test
 
 .PHONY: dock test lint tools check format wheel clean
 
@@ -14,7 +15,7 @@ dock: $(BIN)/python
 
 test: $(BIN)/python
 	rm -rf build
-	$(PIP) '.[test]'
+	$(PIP) '.[$(EXTRAS)]'
 	$(BIN)/pytest --numprocesses auto $(ARGS)
 
 lint: tools

@@ -14,6 +14,7 @@ ORDER = (
     "sim",
     "optics",
     "perception",
+    "networks",
     "estimation",
     "planning",
     "controllers",
@@ -28,7 +29,7 @@ ORDER = (
 )
 MAPPED = ("assets", "controllers", "envs", "experiments")
 EXCEPTIONS = {("assets", "core"), ("core", "assets")}  # presets and their errors know each other
-BLIND = {room: {"sim", "optics"} for room in ("perception", "estimation", "controllers")}
+BLIND = {room: {"sim", "optics"} for room in ("perception", "networks", "estimation", "controllers")}
 
 
 def folder(room):

@@ -60,6 +60,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.reproduce_halo:run_halo",
         "the light about a lamp against single photons",
     ),
+    ("reproduce", "models"): (
+        "auvdock.cli.reproduce_models:run_models",
+        "sizes of the papers' networks and ablation rows beside ours",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("fit-landing",): (
@@ -67,6 +71,7 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "fit the beacons fidelity of a landing to detectors of lights and tags",
     ),
     ("dataset",): ("auvdock.cli.dataset:run", "render labelled frames for learned detectors"),
+    ("export",): ("auvdock.cli.export:run", "write a trained network as an ONNX file"),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),
 }
 """Words of a command: where it lives (imported only when asked for) and what it does."""
