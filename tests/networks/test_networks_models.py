@@ -84,7 +84,7 @@ def test_folding_a_whole_network_changes_no_result():
 def test_every_weight_can_be_trained(model):
     torch.manual_seed(2)
     network = Network(load_model(model)).train()
-    levels = network.raw(torch.rand(2, 3, 64, 96))
+    levels = network.raw(torch.rand(2, 3, 32, 64))
     said = torch.cat([part.flatten() for level in levels for part in level])
     (torch.randn_like(said) * said).sum().backward()
     for name, weight in network.named_parameters():
