@@ -6,6 +6,8 @@ import numpy as np
 import onnxruntime
 import torch
 
+torch.set_num_threads(1)  # more of them wait for each other by spinning where other tests run beside
+
 
 def run_onnx(model: bytes, **inputs: torch.Tensor) -> list[np.ndarray[Any, Any]]:
     """What ONNX Runtime makes of inputs by name."""

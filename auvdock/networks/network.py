@@ -40,6 +40,7 @@ class Network(nn.Module):
         self.stride_px = int(max(strides.values()))
         """Height and width of a picture must be multiples of this."""
         self.channels = tuple(channels[name] for name in self.levels)
+        """Of each level's features, from fine to coarse."""
         self.head = Head(cfg.head, self.channels, [int(strides[name]) for name in self.levels])
 
     def features(self, images: Tensor) -> list[Tensor]:

@@ -35,7 +35,7 @@ def measure_size(cfg: NetworkCfg, height_px: int = 640, width_px: int = 640) -> 
     """Count.
 
     PyTorch's own counter sees the operations themselves. Papers use profilers that hook on layers, which miss matrix
-    products and convolutions that a block calls as functions, and add up to 1.5 % for normalisations.
+    products and convolutions that a block calls as functions, and add some 2 % for normalisations.
 
     Args:
         cfg: the network.

@@ -78,3 +78,16 @@ def test_folding_a_whole_network_changes_no_result():
         network.fold()
         torch.testing.assert_close(network(image), before, rtol=1e-4, atol=1e-3)
     assert not any(isinstance(part, torch.nn.BatchNorm2d) for part in network.modules())
+
+
+@pytest.mark.parametrize("model", ["paper_a_light", "paper_b", "yolo_d"])
+def test_every_weight_can_be_trained(model):
+    torch.manual_seed(2)
+    network = Network(load_model(model)).train()
+    levels = network.raw(torch.rand(2, 3, 32, 64))
+    said = torch.cat([part.flatten() for level in levels for part in level])
+    (torch.randn_like(said) * said).sum().backward()
+    for name, weight in network.named_parameters():
+        assert weight.grad is not None, name
+        assert torch.isfinite(weight.grad).all(), name
+        assert weight.grad.abs().max() > 0.0, name

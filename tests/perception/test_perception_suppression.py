@@ -31,7 +31,7 @@ def area(box):
     similarity=st.floats(0.05, 0.95),
     keypoints=st.integers(0, 3),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_who_stays_and_who_goes(seed, overlap, similarity, keypoints):
     xyxy, scores, points = crowd(seed, keypoints=keypoints)
     cfg = SuppressionCfg(min_score=0.1, max_overlap=overlap, max_similarity=similarity)
