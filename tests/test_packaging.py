@@ -19,6 +19,7 @@ ORDER = (
     "controllers",
     "envs",
     "episode",
+    "footage",
     "campaign",
     "recording",
     "experiments",
