@@ -133,8 +133,9 @@ class ContourTagDetector:
         """Detect in the whole frame, or only in the given regions when there are any."""
         found: dict[int, TagDetection] = {}
         for patch, origin in _patches(frame, regions):
-            searched = equalised(patch) if self._clahe else patch
-            smooth = np.asarray(cv2.medianBlur(cv2.GaussianBlur(searched, (3, 3), 0.0), 3), dtype=np.uint8)
+            smooth = np.asarray(cv2.medianBlur(cv2.GaussianBlur(patch, (3, 3), 0.0), 3), dtype=np.uint8)
+            if self._clahe:  # noise is smoothed first: raised, it breaks the contours
+                smooth = equalised(smooth)
             high, _ = cv2.threshold(smooth, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
             edges = cv2.Canny(smooth, 0.4 * high, 0.8 * high)
             contours, _ = cv2.findContours(edges, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)

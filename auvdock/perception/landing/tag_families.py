@@ -26,7 +26,7 @@ _DICTIONARIES: dict[TagFamily, int] = {
     "6x6": cv2.aruco.DICT_6X6_1000,
     "7x7": cv2.aruco.DICT_7X7_1000,
 }
-_CLIP, _TILES = 3.0, (8, 8)
+_CLIP, _TILES = 2.0, (8, 8)
 """Of the equalisation: greatest count of a code over the mean, and tiles over the searched patch."""
 
 
