@@ -20,6 +20,7 @@ from auvdock.estimation.perceiver import BeaconPerceiver, LandingPerceiver, Perc
 from auvdock.footage.attitude import AttitudeLog, Pose, sensed_attitude
 from auvdock.footage.rows import FootageRow
 from auvdock.footage.sources import Shot
+from auvdock.perception.authentication import AuthenticationCfg
 from auvdock.perception.credibility import CredibilityCfg
 from auvdock.perception.detectors import make_detector
 from auvdock.perception.landing.config import AttitudeCfg, FilterCfg, LandingPerceptionCfg, LightLevelCfg, TagLevelCfg
@@ -30,6 +31,7 @@ from auvdock.perception.pnp import PnpCfg
 
 __all__ = ["FootageCfg", "FootagePerceiver", "Seen"]
 
+_OF_A_RING = "halos"
 _SPEED_M_S = 2.0
 """Without a DVL the vehicle may have gone this fast between two poses, any way."""
 _TURN_RAD_S = 0.5
@@ -125,9 +127,10 @@ def _of_lights(
 ) -> tuple[Perceiver, str]:
     """What perceives a ring of lights, and the detector's name."""
     sigma = cfg.attitude_sigma_deg
-    name = cfg.detector or "threshold"
+    name = cfg.detector or _OF_A_RING
     perception = PerceptionCfg(
         detector=name,
+        authentication=AuthenticationCfg(pairs="every"),
         pnp=PnpCfg(attitude_sigma_deg=max(sigma, PnpCfg.attitude_sigma_deg), attitude_prior_sigma_deg=sigma),
         credibility=CredibilityCfg(speed_error_m_s=_SPEED_M_S),
     )
