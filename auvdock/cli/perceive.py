@@ -31,6 +31,7 @@ from auvdock.footage.attitude import read_attitude
 from auvdock.footage.camera_file import read_camera
 from auvdock.footage.perceiving import FootageCfg, FootagePerceiver, Seen
 from auvdock.footage.rows import FootageRow, check_rows_file, write_rows
+from auvdock.footage.scoring import Score, read_labels, score
 from auvdock.footage.sources import Footage, open_footage
 from auvdock.perception.landing.tag_families import TagFamily
 
@@ -56,7 +57,8 @@ class Perceive:
     camera: Path
     """The camera: TOML, or the camera_info YAML that ROS' calibration tools write."""
     detector: str | None = None
-    """threshold, blob, cores, or your own as package.module:Name."""
+    """threshold, blob, cores, halos, or your own as package.module:Name; without it halos for a ring, cores for a
+    platform."""
     tag_family: TagFamily = "36h11"
     """Family of the landing station's tag."""
     tag_clahe: bool = False
@@ -76,6 +78,8 @@ class Perceive:
     """Write an annotated video here, .mp4 or .avi."""
     record: Path | None = None
     """Write a Rerun recording here."""
+    labels: Path | None = None
+    """JSON of labelled lights to compare with: {"frames": [{"frame", "lights": [{"id", "x", "y", "clipped"}]}]}."""
 
 
 def run(argv: Sequence[str], prog: str) -> int:
@@ -92,8 +96,9 @@ def run(argv: Sequence[str], prog: str) -> int:
     perceiver = FootagePerceiver(cfg, station, camera, log)
     if args.out is not None:
         check_rows_file(args.out)
+    labels, array_m = None if args.labels is None else read_labels(args.labels), station.layout.array_positions_m
     rows, saving = _perceive(args, footage, perceiver, camera, kind, station)
-    _print_summary(rows, len(footage))
+    _print_summary(rows, len(footage), None if labels is None else score(rows, labels, camera, array_m))
     if log is None:
         tell(f"no --attitude: the vehicle was taken as upright within {sigma_deg:g} degrees (one standard deviation)")
     return saving.finish(exit_codes.DONE)
@@ -155,6 +160,19 @@ def _seen(footage: Footage, perceiver: FootagePerceiver, camera: Camera) -> Iter
         raise ConfigError("source", "no frame that can be read", "footage with whole frames")
 
 
+def _add_score(table: Table, compared: Score) -> None:
+    found, lights, frames = compared.found, compared.lights, compared.frames
+    table.add_section()
+    table.add_row("labelled frames", f"{frames}")
+    table.add_row("lights found", f"{found} of {lights} ({100.0 * found / max(lights, 1):.1f} %)")
+    table.add_row("spurious lights a labelled frame", f"{compared.spurious / max(frames, 1):.3f}")
+    table.add_row("median error of a light", "-" if compared.error_px is None else f"{compared.error_px:.2f} px")
+    share = 100.0 * compared.right / max(compared.enough, 1)
+    table.add_row("right pose, of frames with 4 lights", f"{compared.right} of {compared.enough} ({share:.1f} %)")
+    table.add_row("wrong poses", f"{compared.wrong}")
+    table.add_row("frames with a wrong name", f"{compared.misnamed}")
+
+
 def _footage(source: Path) -> Footage:
     if source.suffix != ".rrd":
         return open_footage(source)
@@ -170,7 +188,7 @@ def _station(path: Path) -> tuple[str, StationCfg]:
         return kind, load_toml(LandingStationCfg if kind == "landing" else ConicalStationCfg, path)
 
 
-def _print_summary(rows: Sequence[FootageRow], frames: int) -> None:
+def _print_summary(rows: Sequence[FootageRow], frames: int, compared: Score | None) -> None:
     measured = [row for row in rows if row.measured]
     errors = [row.reprojection_error_px for row in measured if row.reprojection_error_px is not None]
     table = Table()
@@ -180,6 +198,8 @@ def _print_summary(rows: Sequence[FootageRow], frames: int) -> None:
     table.add_row("lights a frame", f"{np.mean([len(row.lights) for row in rows]):.2f}")
     table.add_row("frames with a pose", f"{len(measured)} ({100.0 * len(measured) / len(rows):.1f} %)")
     table.add_row("median reprojection error", f"{np.median(errors):.2f} px" if errors else "-")
+    if compared is not None:
+        _add_score(table, compared)
     output().print(table)
     if not measured:
         messages().print("no pose: are --station and --camera those of the footage?", highlight=False, soft_wrap=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,6 +33,10 @@ from auvdock.perception.pnp import PnpCfg
 __all__ = ["FootageCfg", "FootagePerceiver", "Seen"]
 
 _OF_A_RING = "halos"
+_STRAYS_N = 1.0
+"""Spurious lights a frame that `halos` stays well below on real footage (docs/real_frames.md)."""
+_RANGE_SIGMA = 0.2
+"""A pose is given up to twice the uncertainty that a pilot accepts: the row tells it, and nothing is steered."""
 _SPEED_M_S = 2.0
 """Without a DVL the vehicle may have gone this fast between two poses, any way."""
 _TURN_RAD_S = 0.5
@@ -132,7 +137,11 @@ def _of_lights(
         detector=name,
         authentication=AuthenticationCfg(pairs="every"),
         pnp=PnpCfg(attitude_sigma_deg=max(sigma, PnpCfg.attitude_sigma_deg), attitude_prior_sigma_deg=sigma),
-        credibility=CredibilityCfg(speed_error_m_s=_SPEED_M_S),
+        credibility=CredibilityCfg(
+            max_range_sigma=_RANGE_SIGMA,
+            speed_error_m_s=_SPEED_M_S,
+            strays_n=_STRAYS_N if name == _OF_A_RING else None,
+        ),
     )
     lights = BeaconPerception(perception, camera, station.layout, heading_surveyed=knows_heading)
     return BeaconPerceiver(make_detector(name), lights), name
@@ -166,6 +175,7 @@ def _row(frame: str | int, percept: Percept) -> FootageRow:
         pose=None if pose is None else pose.T_station_camera.tolist(),
         measured=pose is not None and pose.measured,
         reprojection_error_px=None if pose is None else pose.reprojection_error_px,
+        position_sigma_m=None if pose is None else math.sqrt(np.linalg.eigvalsh(pose.covariance[:3, :3])[-1]),
         tag_ids=[tag.tag_id for tag in tags],
         tag_corners=[tag.corners_px.tolist() for tag in tags],
     )

@@ -24,6 +24,7 @@ _TYPES = {
     "pose": pa.list_(pa.list_(pa.float64())),
     "measured": pa.bool_(),
     "reprojection_error_px": pa.float64(),
+    "position_sigma_m": pa.float64(),
     "tag_ids": pa.list_(pa.int64()),
     "tag_corners": pa.list_(pa.list_(_POINT)),
 }
@@ -41,6 +42,7 @@ class FootageRow:
         pose: T_station_camera (4, 4) by rows, None where there is none.
         measured: True if the pose rests on this frame's lights or tag, False if it is carried on or there is none.
         reprojection_error_px: mean distance between lights and their reprojections, None where there is no pose.
+        position_sigma_m: greatest standard deviation of the camera's place in any direction, None without a pose.
         tag_ids: numbers of the tags that were read, within their family.
         tag_corners: [x, y] of the four corners of each, px: upper left, upper right, lower right, lower left as the tag
             is read.
@@ -52,6 +54,7 @@ class FootageRow:
     pose: list[list[float]] | None
     measured: bool
     reprojection_error_px: float | None
+    position_sigma_m: float | None
     tag_ids: list[int]
     tag_corners: list[list[list[float]]]
 

@@ -25,7 +25,8 @@ def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
     """A detector by name.
 
     Args:
-        name: "threshold", "blob", "cores" (near lights), "halos" (lamps that burn out), or "package.module:Name" for a class or factory of your own.
+        name: "threshold", "blob", "cores" (near lights), "halos" (lamps that burn out), or "package.module:Name" for a
+            class or factory of your own.
         settings: fields of the detector's configuration; keyword arguments of your own class.
 
     Raises:

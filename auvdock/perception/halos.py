@@ -8,7 +8,8 @@ core, the others close to it, so that the core is white and the colour stands in
 2. a hill of colour about it: on most rays away from the core, the excess of one channel over both others rises to a
    first summit and falls again, and the summits lie about equally far out; of a lamp too far away to burn out the
    summit is the core itself;
-3. one of equals: neither core nor halo much weaker than the strongest of the frame, and none inside another's halo.
+3. where several burn out, one of equals: neither core nor halo much weaker than the strongest; and none inside
+   another's halo.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ _HIGH = 3 * _RAYS // 4
 _WINDOW, _SHIFTS = 0.2, 5
 """A core's centroid is that of a Gaussian window of so many times the summits' distance, found in so many steps: what
 is farther off may be a rim in daylight."""
+_BURNT_PX = 2.0
+"""A lamp whose summits lie so far out, at half resolution, has burnt out."""
 _FALL = 0.7
 """Of its summit a hill must fall below this share to be one."""
 
@@ -51,16 +54,18 @@ class HaloCfg(Checked):
     """What is wider in every direction is no core."""
     halo_px: Annotated[int, at_least(6)] = 40
     """Farthest that a halo's colour is followed from the core."""
-    min_contrast: Positive = 12.0
+    min_contrast: Positive = 6.0
     """Codes of a core above its surroundings, and not less than six σ of the noise."""
-    min_colour: Positive = 20.0
+    min_colour: Positive = 15.0
     """Codes by which the halo's channel exceeds both others at the summits."""
     spread: Positive = 0.2
     """Greatest standard deviation of the summits' distances, over their mean; one pixel of half the resolution more."""
-    min_rays: Share = 0.45
+    min_rays: Share = 0.5
     """Least share of the rays that have a summit half as high as the halo's."""
     equal: Share = 0.6
-    """How weak a light's core and halo may be beside the frame's strongest."""
+    """How weak a core may be beside the frame's strongest, and a halo beside the strongest of its colour, where two or
+    more lamps of a colour burn out: what they light shines then as well. Lamps that do not may differ, as a ring and
+    the far lamp above it do."""
     max_lights: Count = 32
     """Only the lights with the strongest cores are kept."""
 
@@ -103,9 +108,13 @@ class HaloDetector:
         kind: IntArray = colour.argmax(axis=1)
         summit, away, spread, rays = np.stack(hills)[kind, np.arange(len(places))].T
         good = (summit >= cfg.min_colour) & (rays >= cfg.min_rays) & (spread <= cfg.spread * away + 1.0)
+        burnt = away >= _BURNT_PX
+        for k in range(len(hills)):
+            if np.count_nonzero(same := good & burnt & (kind == k)) > 1:
+                good &= height >= cfg.equal * height[same].max()
+                good &= (kind != k) | (summit >= cfg.equal * summit[same].max())
         if not good.any():
             return Detections.empty()
-        good &= (height >= cfg.equal * height[good].max()) & (summit >= cfg.equal * summit[good].max())
         chosen = _alone(places, spread / (away + 1.0), away, np.flatnonzero(good))
         chosen = chosen[np.argsort(-height[chosen], kind="stable")][: cfg.max_lights]
         sharp = np.asarray(cv2.morphologyEx(level, cv2.MORPH_TOPHAT, self._narrow), dtype=np.uint8)
@@ -153,8 +162,8 @@ def _first_of_each(places: IntArray) -> IntArray:
 def _hills(excess: Image, places: IntArray, ways: Array, reach: int, floor: float) -> Array:
     """(n, 4) of the first hill of colour about each place, along rays.
 
-    Height of the rays' summits, at their upper quartile; mean and standard deviation of their distances, of those that are half as high;
-    share of the rays that have such a one.
+    Height of the rays' summits, at their upper quartile; of the summits half as high, mean and standard deviation of
+    their distances, and the share of the rays that have one.
 
     Args:
         excess: (h, w) codes.
@@ -169,7 +178,7 @@ def _hills(excess: Image, places: IntArray, ways: Array, reach: int, floor: floa
         for k in range(len(ways)):
             top[k], far[k] = 0.0, reach
             for r in range(reach + 1):
-                x, y = int(round(places[n, 0] + r * ways[k, 0])), int(round(places[n, 1] + r * ways[k, 1]))
+                x, y = round(places[n, 0] + r * ways[k, 0]), round(places[n, 1] + r * ways[k, 1])
                 if x < 0 or y < 0 or x >= excess.shape[1] or y >= excess.shape[0]:
                     break
                 if excess[y, x] > top[k]:
@@ -220,11 +229,11 @@ def _centroids(level: Image, places: IntArray, window: Array) -> Array:
     for n in range(len(places)):
         top = float(level[places[n, 1], places[n, 0]])
         x, y, area = float(places[n, 0]), float(places[n, 1]), 0
-        reach = int(math.ceil(3.0 * window[n]))
+        reach = math.ceil(3.0 * window[n])
         for _ in range(_SHIFTS):
             total = column = row = 0.0
             area = 0
-            left, upper = int(round(x)), int(round(y))
+            left, upper = round(x), round(y)
             for v in range(max(upper - reach, 0), min(upper + reach + 1, level.shape[0])):
                 for u in range(max(left - reach, 0), min(left + reach + 1, level.shape[1])):
                     weight = max(level[v, u] - 0.3 * top, 0.0)
