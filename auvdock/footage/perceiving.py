@@ -29,12 +29,15 @@ from auvdock.perception.landing.tag_detectors import make_tag_detector
 from auvdock.perception.landing.tag_families import TagFamily
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
 from auvdock.perception.pnp import PnpCfg
+from auvdock.perception.tracker import TrackerCfg
 
 __all__ = ["FootageCfg", "FootagePerceiver", "Seen"]
 
 _OF_A_RING = "halos"
 _STRAYS_N = 1.0
 """Spurious lights a frame that `halos` stays well below on real footage (docs/real_frames.md)."""
+_TRACKER = TrackerCfg(pixel_sigma_px=0.7)
+"""σ of a light of a real lamp in a real lens: interlace, compression, calibration (docs/real_frames.md)."""
 _RANGE_SIGMA = 0.2
 """A pose is given up to twice the uncertainty that a pilot accepts: the row tells it, and nothing is steered."""
 _SPEED_M_S = 2.0
@@ -133,14 +136,18 @@ def _of_lights(
     """What perceives a ring of lights, and the detector's name."""
     sigma = cfg.attitude_sigma_deg
     name = cfg.detector or _OF_A_RING
+    is_clean = name == _OF_A_RING
     perception = PerceptionCfg(
         detector=name,
-        authentication=AuthenticationCfg(pairs="every"),
+        tracker=_TRACKER,
+        authentication=AuthenticationCfg(
+            pairs="every", min_occurrences=1 if is_clean else AuthenticationCfg.min_occurrences
+        ),
         pnp=PnpCfg(attitude_sigma_deg=max(sigma, PnpCfg.attitude_sigma_deg), attitude_prior_sigma_deg=sigma),
         credibility=CredibilityCfg(
             max_range_sigma=_RANGE_SIGMA,
             speed_error_m_s=_SPEED_M_S,
-            strays_n=_STRAYS_N if name == _OF_A_RING else None,
+            strays_n=_STRAYS_N if is_clean else None,
         ),
     )
     lights = BeaconPerception(perception, camera, station.layout, heading_surveyed=knows_heading)
