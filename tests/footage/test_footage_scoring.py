@@ -51,7 +51,7 @@ def test_a_pose_is_right_where_it_puts_the_labels(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", '{"frames": [{"frame": "a"}]}', '{"frames": [{"frame": "a", "lights": [1]}]}']
+    "text", ["", "[]", '{"frames": [{"frame": "a"}]}', '{"frames": [{"frame": "a", "lights": 1}]}']
 )
 def test_what_is_no_labels_file(tmp_path, text):
     (tmp_path / "labels.json").write_text(text, encoding="utf-8")

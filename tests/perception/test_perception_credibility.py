@@ -147,7 +147,7 @@ def test_odds_fall_with_a_crowd_and_rise_with_every_beacon_that_is_where_it_must
 
 
 def test_a_detector_known_to_show_few_strays_speaks_for_the_pose():
-    """Of n lights each says ln(N / strays) more, N the lights of the frame; strays left unexplained count all the same."""
+    """Each of n lights says ln(N / strays) more, N the frame's lights; unexplained ones are strays all the same."""
     truth, _ = random_motion(np.random.default_rng(3), BLUE_LAMPS).at(0.0)
     solution = solved(truth, truth[:3, :3].T, np.zeros((6, 2)), np.arange(6))
     none = np.zeros(0, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The halo detector on pictures of what a metered camera makes of a lit station by day: lamps burnt out, white walls."""
+"""The halo detector on what a metered camera makes of a lit station by day: lamps burnt out, a white funnel."""
 
 from __future__ import annotations
 
