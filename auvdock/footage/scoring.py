@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from auvdock.core.arrays import Array, IntArray
+from auvdock.core.arrays import Array, BoolArray, IntArray
 from auvdock.core.camera import Camera
 from auvdock.core.errors import ConfigError
 from auvdock.footage.rows import FootageRow
@@ -42,7 +42,7 @@ class LabelledLights(NamedTuple):
 
     place_px: Array
     beacon: IntArray
-    clipped: Array
+    clipped: BoolArray
 
 
 @dataclass(frozen=True)
