@@ -50,8 +50,9 @@ def annotated(seen: Seen, camera: Camera, array_m: Array) -> Image:
             cv2.drawMarker(image, (x, y), _EXPECTED, cv2.MARKER_CROSS, 9, 1, cv2.LINE_AA)
         away_m = float(np.linalg.norm(T[:3, 3]))
         words += f"  {away_m:.2f} m  {pose.reprojection_error_px:.2f} px{'' if pose.measured else '  carried on'}"
-    for colour, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        cv2.putText(image, words, (8, 18), _FONT, 0.45, colour, width, cv2.LINE_AA)
+    (width, height), _ = cv2.getTextSize(words, _FONT, 0.45, 1)
+    cv2.rectangle(image, (4, 4), (width + 12, height + 16), (0, 0, 0), cv2.FILLED)
+    cv2.putText(image, words, (8, height + 10), _FONT, 0.45, (255, 255, 255), 1, cv2.LINE_AA)
     return image
 
 
