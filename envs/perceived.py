@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from auvdock.core.errors import located
+from auvdock.core.errors import ConfigError, located
 from auvdock.envs.config import WorldCfg
 from auvdock.envs.landing_config import LandingWorldCfg
 from auvdock.envs.landing_world import LandingWorld
@@ -19,6 +19,8 @@ from auvdock.perception.landing.tag_detectors import make_tag_detector
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
 
 __all__ = ["docking_metrics", "landing_metrics", "perceived_docking", "perceived_landing"]
+
+_DRAWN_FAMILY = "36h11"
 
 
 def perceived_docking(cfg: WorldCfg, perception: PerceptionCfg) -> tuple[DockingWorld, BeaconPerceiver]:
@@ -44,7 +46,10 @@ def perceived_landing(cfg: LandingWorldCfg, perception: LandingPerceptionCfg) ->
     """
     with located("perception."):
         detector = make_detector(perception.detector)
-        tag_detector = make_tag_detector(perception.tag_detector, (cfg.station.tag.tag_id,))
+        tag = perception.tag
+        if tag.family != _DRAWN_FAMILY:
+            raise ConfigError("tag.family", tag.family, f"{_DRAWN_FAMILY}, the one that the world draws")
+        tag_detector = make_tag_detector(perception.tag_detector, (cfg.station.tag.tag_id,), tag.family, tag.clahe)
     world = LandingWorld(cfg, perception.detector, perception.tag_detector)
     return world, LandingPerceiver(detector, tag_detector, LandingEstimator(perception, world.camera, cfg.station))
 

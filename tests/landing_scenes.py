@@ -116,13 +116,16 @@ def tag_frame(
     rng: np.random.Generator | None = None,
     *,
     tag_id: int = 0,
+    family: int = cv2.aruco.DICT_APRILTAG_36h11,
     white: float = 150.0,
     black: float = 40.0,
     blur_px: float = 0.8,
     noise_dn: float = 2.0,
 ) -> Frame:
     """The tag through the distorting lens, two samples a pixel each way, blurred and noisy; codes linear in light."""
-    marker = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11), tag_id, 8)
+    dictionary = cv2.aruco.getPredefinedDictionary(family)
+    edge = dictionary.markerSize + 2
+    marker = cv2.aruco.generateImageMarker(dictionary, tag_id, edge)
     cells = np.pad(np.asarray(marker, dtype=np.float64) / 255.0, 1, constant_values=1.0)
     fine = 2
     grid = (np.arange(800 * fine) + 0.5) / fine - 0.5, (np.arange(600 * fine) + 0.5) / fine - 0.5
@@ -140,10 +143,11 @@ def tag_frame(
     scale = (STATION.tag.position_m[2] - p[2]) / down
     forward = p[0] + scale * (R[0, 0] * x + R[0, 1] * y + R[0, 2]) - STATION.tag.position_m[0]
     port = p[1] + scale * (R[1, 0] * x + R[1, 1] * y + R[1, 2]) - STATION.tag.position_m[1]
-    cell = STATION.tag.size_m / 8.0
-    row, column = np.floor(5.0 - forward / cell).astype(int), np.floor(5.0 - port / cell).astype(int)
-    inside = (row >= 0) & (row < 10) & (column >= 0) & (column < 10)
-    level = np.where(inside, cells[np.clip(row, 0, 9), np.clip(column, 0, 9)], 0.3)
+    cell, last = STATION.tag.size_m / edge, edge + 1
+    middle = 0.5 * edge + 1.0
+    row, column = np.floor(middle - forward / cell).astype(int), np.floor(middle - port / cell).astype(int)
+    inside = (row >= 0) & (row <= last) & (column >= 0) & (column <= last)
+    level = np.where(inside, cells[np.clip(row, 0, last), np.clip(column, 0, last)], 0.3)
     image = level.reshape(600, fine, 800, fine).mean(axis=(1, 3)) * (white - black) + black
     image = np.asarray(cv2.GaussianBlur(image, (0, 0), blur_px), dtype=np.float64) if blur_px > 0.0 else image
     if rng is not None:

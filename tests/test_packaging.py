@@ -21,6 +21,7 @@ ORDER = (
     "metrics",
     "envs",
     "episode",
+    "footage",
     "campaign",
     "dataset",
     "recording",

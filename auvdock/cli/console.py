@@ -66,8 +66,14 @@ def counting_progress() -> Progress:
     )
 
 
-def track(items: Iterable[T], name: str) -> Generator[T]:
-    """The items, one after the other, with a bar on standard error that tells how many are done."""
+def track(items: Iterable[T], name: str, total: int | None = None) -> Generator[T]:
+    """The items, one after the other, with a bar on standard error that tells how many are done.
+
+    Args:
+        items: what is worked on.
+        name: of the work.
+        total: how many they are, where they have no length.
+    """
     columns = (description(), BarColumn(), TextColumn("{task.percentage:>3.0f}%", markup=False), TimeRemainingColumn())
     with live(messages(), *columns) as progress:
-        yield from progress.track(items, description=name)
+        yield from progress.track(items, total=total, description=name)

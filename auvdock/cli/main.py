@@ -26,6 +26,7 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
     ("dock",): ("auvdock.cli.dock_from:run_from", "--from DIR#EPISODE: an episode of a campaign again"),
     ("sweep",): ("auvdock.cli.sweep:run", "run many episodes over currents, turbidity and more"),
     ("report",): ("auvdock.cli.report:run", "turn a campaign into one HTML page and tables for a paper"),
+    ("perceive",): ("auvdock.cli.perceive:run", "perceive lights, tags and poses in footage of your own"),
     ("view",): ("auvdock.cli.view:run", "open a recording in the Rerun viewer"),
     ("plan",): ("auvdock.cli.plan:run", "tell where a station's lights can be seen"),
     ("reproduce", "guidance-space"): (

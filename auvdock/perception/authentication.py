@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from auvdock.core.limits import AcuteDeg, Count, Positive, Share, at_least
 from auvdock.perception.proposals import propose, surest_lights
 from auvdock.perception.tracker import LightTracker
 
-__all__ = ["AuthenticationCfg", "Authenticator", "symmetric_pairs"]
+__all__ = ["AuthenticationCfg", "Authenticator", "every_pair", "symmetric_pairs"]
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,9 @@ class AuthenticationCfg(Checked):
     """Greatest distance between a candidate and where a beacon must be, over the array's radius in the image."""
     tolerance_px: Positive = 1.5
     """Added to it for noise."""
+    pairs: Literal["opposite", "every"] = "opposite"
+    """Pairs of beacons that two candidates may be taken for: opposite ones, whose images fix the array's place best,
+    or every pair, so that an arc of the array is enough."""
     proposals: Count = 3
     """Best proposals handed to the pose solver."""
 
@@ -62,7 +65,7 @@ class Authenticator:
         """
         self._cfg = cfg
         self._points = points_m
-        self._pairs = symmetric_pairs(points_m)
+        self._pairs = symmetric_pairs(points_m) if cfg.pairs == "opposite" else every_pair(points_m)
         self._radius_m = float(np.linalg.norm(points_m - points_m.mean(axis=0), axis=1).mean())
         self._tolerance = cfg.tolerance_px / focal_px
         self._min_cosine = math.cos(math.radians(cfg.max_angle_deg))
@@ -96,11 +99,16 @@ class Authenticator:
         )
 
 
+def every_pair(points_m: Array) -> IntArray:
+    """(p, 2) indices of every two beacons, the lower one first."""
+    return np.array([(i, j) for i in range(len(points_m)) for j in range(i + 1, len(points_m))], dtype=np.int64)
+
+
 def symmetric_pairs(points_m: Array) -> IntArray:
     """(p, 2) index pairs of beacons that lie opposite each other about the centroid; all pairs if fewer than two do."""
     centre = points_m.mean(axis=0)
     radius = float(np.linalg.norm(points_m - centre, axis=1).max())
-    every = np.array([(i, j) for i in range(len(points_m)) for j in range(i + 1, len(points_m))], dtype=np.int64)
+    every = every_pair(points_m)
     gap = np.linalg.norm(points_m[every[:, 0]] + points_m[every[:, 1]] - 2.0 * centre, axis=1)
     opposite = every[gap < 0.05 * radius]
     return opposite if len(opposite) >= 2 else every

@@ -67,6 +67,9 @@ class CredibilityCfg(Checked):
     pose of the lights' plane; a thousand to one."""
     detection_probability: OpenShare = 0.9
     """Share of the beacons in view that a detector finds, for the odds of a new identification."""
+    strays_n: Positive | None = None
+    """Spurious lights that the detector is known to show in a frame, at most; more count where more lights are left
+    unexplained. None where nobody knows: then all lights of the frame count as if they were."""
     min_log_odds: float = 6.9
     """Least natural logarithm of (probability of these lights if they are the beacons, over that if they are not): a
     thousand to one, as in a landing."""
@@ -173,10 +176,11 @@ class Credibility:
     ) -> float:
         """Natural logarithm of the odds that the lights behind a pose are beacons rather than spurious lights.
 
-        For n lights that gave the pose, ln [(P_D A / N)^n ∫ Π N(z_i; pose) p(pose) d(pose)], where N lights lie on the
-        area A; the integral is (2π σ²)^{-n} e^{-χ²/2} (2π)³ √|Σ| p(pose), with p uniform over the positions from which
-        lamps can be seen. Each further blue lamp that should be in view adds ln(P_D A N(z; pose) / N) for the light
-        nearest to its place, or ln(1 - P_D) where there is none.
+        For n lights that gave the pose, ln [(P_D A / N)^n ∫ Π N(z_i; pose) p(pose) d(pose)], where N strays lie on the
+        area A (as many as there are lights, unless `strays_n` says better); the integral is
+        (2π σ²)^{-n} e^{-χ²/2} (2π)³ √|Σ| p(pose), with p uniform over the positions from which lamps can be seen. Each
+        further blue lamp that should be in view adds ln(P_D A N(z; pose) / N) for the light nearest to its place, or
+        ln(1 - P_D) where there is none.
 
         Args:
             solution: pose of n lights, all seen.
@@ -187,7 +191,9 @@ class Credibility:
         """
         n = solution.lights_n
         found = self._cfg.detection_probability
-        each = math.log(found * self._area_px / (2.0 * math.pi * (n + len(others_px))))
+        known = self._cfg.strays_n
+        strays = n + len(others_px) if known is None else max(known, len(others_px))
+        each = math.log(found * self._area_px / (2.0 * math.pi * strays))
         log_pose = 3.0 * math.log(2.0 * math.pi) + 0.5 * float(np.linalg.slogdet(solution.covariance())[1])
         log_pose += self._log_attitude(heading_sigma_rad) - self._log_volume
         odds = n * (each - 2.0 * math.log(sigma_px)) - 0.5 * solution.cost + log_pose

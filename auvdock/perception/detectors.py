@@ -11,12 +11,13 @@ from auvdock.core.named import find_named
 from auvdock.core.station import ConicalStationCfg
 from auvdock.perception.blob import BlobCfg, BlobDetector
 from auvdock.perception.checked_detector import CheckedDetector
+from auvdock.perception.halos import HaloCfg, HaloDetector
 from auvdock.perception.landing.cores import CoreCfg, CoreDetector
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
 __all__ = ["DETECTORS", "make_detector", "make_station_detector"]
 
-DETECTORS = ("threshold", "blob", "cores")
+DETECTORS = ("threshold", "blob", "cores", "halos")
 """Names of the package's own detectors; anything with a colon is looked up as "package.module:Name"."""
 
 
@@ -24,7 +25,8 @@ def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
     """A detector by name.
 
     Args:
-        name: "threshold", "blob", "cores" (near lights), or "package.module:Name" for a class or factory of your own.
+        name: "threshold", "blob", "cores" (near lights), "halos" (lamps that burn out), or "package.module:Name" for a
+            class or factory of your own.
         settings: fields of the detector's configuration; keyword arguments of your own class.
 
     Raises:
@@ -36,6 +38,8 @@ def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
         return BlobDetector(_configure(BlobCfg, settings))
     if name == "cores":
         return CoreDetector(_configure(CoreCfg, settings))
+    if name == "halos":
+        return HaloDetector(_configure(HaloCfg, settings))
     if ":" not in name:
         raise ConfigError("detector", name, f"one of {', '.join(DETECTORS)}, or your own as package.module:Name")
     return _foreign(name, settings)

@@ -11,9 +11,9 @@ import rerun as rr
 
 from auvdock.core.arrays import Array
 from auvdock.recording import paths
-from auvdock.recording.batch import PIXEL_CORNER, Batch
+from auvdock.recording.batch import Batch
+from auvdock.recording.lights import write_images, write_lights
 from auvdock.recording.modes import ModeFollower
-from auvdock.recording.palette import CANDIDATE, IDENTIFIED, LOST, class_colours
 from auvdock.recording.pose_error import camera_in_station, pose_errors
 
 if TYPE_CHECKING:
@@ -65,9 +65,9 @@ class ColumnWriter:
         T_station_camera = camera_in_station(self._setup.T_world_station, T_world_body, T_body_camera)
         self._write_pose(batch, rows, T_station_camera)
         self._part.write(batch, [row.tick for row in rows], T_station_camera)
-        self._write_lights(batch, rows)
+        _write_lights(batch, rows)
         self._write_modes(batch, rows)
-        _write_images(batch, rows)
+        write_images(batch, [row.jpeg for row in rows])
 
     def _write_motion(self, batch: Batch, rows: Sequence[Row], T_world_body: Array) -> None:
         truths = [row.tick.truth for row in rows]
@@ -112,18 +112,6 @@ class ColumnWriter:
             paths.PATH, rr.LineStrips3D.columns(strips=np.stack([starts, camera_world_m], axis=1).astype(np.float32))
         )
 
-    def _write_lights(self, batch: Batch, rows: Sequence[Row]) -> None:
-        seen = [(index, row.tick.percept) for index, row in enumerate(rows) if row.tick.percept is not None]
-        if not seen:
-            return
-        frames = batch.select(np.array([index for index, _ in seen]))
-        percepts = [percept for _, percept in seen]
-        _write_detections(frames, percepts)
-        _write_tracks(frames, percepts)
-        _write_bearings(frames, percepts)
-        counts = [(len(percept.detections), len(percept.tracks), percept.array_count) for percept in percepts]
-        frames.scalars(paths.LIGHT_COUNTS, np.array(counts, dtype=np.float64))
-
     def _write_modes(self, batch: Batch, rows: Sequence[Row]) -> None:
         modes = [row.tick.command.mode for row in rows]
         batch.scalars(paths.MODE_NUMBER, np.array([self._modes.number(mode) for mode in modes], dtype=np.float64))
@@ -146,38 +134,8 @@ def _ranges(rows: Sequence[Row]) -> Array:
     return np.array([row.tick.truth.range_m for row in rows])
 
 
-def _write_detections(frames: Batch, percepts: Sequence[Percept]) -> None:
-    xyxy = np.concatenate([percept.detections.xyxy for percept in percepts]) + PIXEL_CORNER
-    colours = class_colours(np.concatenate([percept.detections.class_id for percept in percepts]))
-    boxes = rr.Boxes2D.columns(
-        centers=(xyxy[:, :2] + xyxy[:, 2:]) / 2.0, half_sizes=(xyxy[:, 2:] - xyxy[:, :2]) / 2.0, colors=colours
-    )
-    frames.send(paths.DETECTIONS, boxes.partition([len(percept.detections) for percept in percepts]))
-
-
-def _write_tracks(frames: Batch, percepts: Sequence[Percept]) -> None:
-    tracks = [track for percept in percepts for track in percept.tracks]
-    centres = np.array([track.centre_px for track in tracks]).reshape(-1, 2) + PIXEL_CORNER
-    labels = [f"#{track.track_id}" if track.beacon_id is None else f"B{track.beacon_id}" for track in tracks]
-    colours = [LOST if track.missed else (CANDIDATE if track.beacon_id is None else IDENTIFIED) for track in tracks]
-    points = rr.Points2D.columns(positions=centres, labels=labels, colors=np.array(colours, dtype=np.uint32))
-    frames.send(paths.TRACKS, points.partition([len(percept.tracks) for percept in percepts]))
-
-
-def _write_bearings(frames: Batch, percepts: Sequence[Percept]) -> None:
-    named = [
-        [(bearing, name) for bearing, name in ((percept.long_range, "far"), (percept.entrance, "entrance")) if bearing]
-        for percept in percepts
-    ]
-    flat = [pair for pairs in named for pair in pairs]
-    centres = np.array([bearing.centre_px for bearing, _ in flat]).reshape(-1, 2) + PIXEL_CORNER
-    points = rr.Points2D.columns(positions=centres, labels=[name for _, name in flat])
-    frames.send(paths.BEARINGS, points.partition([len(pairs) for pairs in named]))
-
-
-def _write_images(batch: Batch, rows: Sequence[Row]) -> None:
-    images = [(index, row.jpeg) for index, row in enumerate(rows) if row.jpeg is not None]
-    if images:
-        blobs = [np.frombuffer(jpeg, dtype=np.uint8) for _, jpeg in images]
-        columns = rr.EncodedImage.columns(blob=blobs, media_type=["image/jpeg"] * len(blobs))
-        batch.select(np.array([index for index, _ in images])).send(paths.IMAGE, columns)
+def _write_lights(batch: Batch, rows: Sequence[Row]) -> None:
+    seen = [(index, row.tick.percept) for index, row in enumerate(rows) if row.tick.percept is not None]
+    if seen:
+        frames = batch.select(np.array([index for index, _ in seen]))
+        write_lights(frames, [percept for _, percept in seen])

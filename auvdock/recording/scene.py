@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from auvdock.episode.trace import EpisodeSetup
     from auvdock.recording.part import Series, StationPart
 
-__all__ = ["log_scene"]
+__all__ = ["log_scene", "log_surroundings"]
 
 _BEAM_LENGTH_M = 3.0
 _PLOTS: dict[str, Series] = {
@@ -50,7 +50,16 @@ _PLOTS: dict[str, Series] = {
 
 
 def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup, part: StationPart) -> None:
-    """Log everything static, once."""
+    """Log everything static of an episode, once."""
+    log_surroundings(stream, setup, part)
+    for path, shape in hull_shapes(setup.vehicle).items():
+        stream.log(path, shape, static=True, strict=True)
+    # Actuators have no colours of their own: the viewer's palette tells any number of them apart.
+    stream.log(paths.COMMANDS, rr.SeriesLines(names=list(setup.vehicle.actuator_names)), static=True, strict=True)
+
+
+def log_surroundings(stream: rr.RecordingStream, setup: EpisodeSetup, part: StationPart) -> None:
+    """Log what is static and no part of the vehicle's hull: station, camera, how marks and plots look."""
 
     def static(path: str, *what: rr.AsComponents) -> None:
         stream.log(path, *what, static=True, strict=True)
@@ -59,8 +68,6 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup, part: StationPart
     static(paths.STATION, _transform(setup.T_world_station))
     _log_lights(stream, setup.station.layout)
     part.log_scene(stream)
-    for path, shape in hull_shapes(setup.vehicle).items():
-        static(path, shape)
     static(paths.CAMERA, _transform(setup.camera.T_body_camera), _pinhole(setup.camera))
     static(paths.PATH, rr.LineStrips3D.from_fields(colors=[rgba(255, 220, 80)], radii=[-1.5]))
     static(paths.ESTIMATES, rr.Points3D.from_fields(colors=[rgba(255, 90, 200)], radii=[-1.5]))
@@ -71,12 +78,9 @@ def log_scene(stream: rr.RecordingStream, setup: EpisodeSetup, part: StationPart
         paths.BEARINGS,
         rr.Points2D.from_fields(radii=[-5.0], colors=[rgba(255, 255, 255, 160)], show_labels=True),
     )
-    actuators = tuple((name, 0) for name in setup.vehicle.actuator_names)
-    for path, series in {**_PLOTS, **part.plots, paths.COMMANDS: actuators}.items():
-        names = [name for name, _ in series]
-        # Actuators have no colours of their own: the viewer's palette tells any number of them apart.
-        colours = np.array([colour for _, colour in series if colour], dtype=np.uint32)
-        static(path, rr.SeriesLines(names=names, colors=colours if len(colours) else None))
+    for path, series in {**_PLOTS, **part.plots}.items():
+        colours = np.array([colour for _, colour in series], dtype=np.uint32)
+        static(path, rr.SeriesLines(names=[name for name, _ in series], colors=colours))
     static(
         paths.MODE_NUMBER, rr.SeriesLines(names=["mode"], interpolation_mode=rr.components.InterpolationMode.StepAfter)
     )

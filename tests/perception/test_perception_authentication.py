@@ -30,7 +30,7 @@ from perception_scenes import (
 from auvdock.core.arrays import Array, IntArray
 from auvdock.core.contracts import Detections, Percept
 from auvdock.core.errors import ConfigError
-from auvdock.perception.authentication import AuthenticationCfg, symmetric_pairs
+from auvdock.perception.authentication import AuthenticationCfg, Authenticator, symmetric_pairs
 from auvdock.perception.pipeline import BeaconPerception, PerceptionCfg
 
 CHUNK = 2500
@@ -187,3 +187,25 @@ def test_opposite_pairs_of_the_ring():
 def test_bad_setting_is_refused(field: str, value: Any):
     with pytest.raises(ConfigError, match=field):
         AuthenticationCfg(**{field: value})
+
+
+@pytest.mark.parametrize("roll_deg", [-13.0, 0.0, 7.0])
+def test_identities_from_an_arc(roll_deg: float):
+    """Four lamps side by side, no two opposite, of a ring of eight: named from every pair, not from opposite ones.
+
+    The vehicle takes itself as upright and is rolled; each lamp is off by 0.3 px.
+    """
+    angle = np.radians(np.arange(64.0, -296.0, -45.0))
+    ring = np.column_stack([np.zeros(8), np.cos(angle), np.sin(angle)])
+    upright = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+    c, s = np.cos(np.radians(roll_deg)), np.sin(np.radians(roll_deg))
+    rolled = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ upright
+    points = ring @ rolled.T + np.array([0.4, 1.0, 4.5])
+    rng = np.random.default_rng(0)
+    seen = np.array([7, 0, 1, 6])
+    xy = points[seen, :2] / points[seen, 2:] + rng.normal(0.0, 0.3 / 600.0, (4, 2))
+    every = Authenticator(AuthenticationCfg(pairs="every"), ring, 600.0).propose(xy, upright)
+    expected = np.full(8, -1)
+    expected[seen] = np.arange(4)
+    np.testing.assert_array_equal(every[0], expected)
+    assert len(Authenticator(AuthenticationCfg(), ring, 600.0).propose(xy, upright)) == 0

@@ -146,6 +146,20 @@ def test_odds_fall_with_a_crowd_and_rise_with_every_beacon_that_is_where_it_must
     assert all_in_view(truth, BLUE_LAMPS)
 
 
+def test_a_detector_known_to_show_few_strays_speaks_for_the_pose():
+    """Each of n lights says ln(N / strays) more, N the frame's lights; unexplained ones are strays all the same."""
+    truth, _ = random_motion(np.random.default_rng(3), BLUE_LAMPS).at(0.0)
+    solution = solved(truth, truth[:3, :3].T, np.zeros((6, 2)), np.arange(6))
+    none = np.zeros(0, dtype=np.int64)
+
+    def odds(strays_n: float | None, others: int) -> float:
+        judge = Credibility(CredibilityCfg(strays_n=strays_n), CAMERA, BLUE_LAMPS, PRIOR_RAD)
+        return judge.log_odds(solution, none, np.full((others, 2), 5.0), SIGMA_PX)
+
+    assert odds(0.5, 0) - odds(None, 0) == pytest.approx(6.0 * math.log(6.0 / 0.5))
+    assert odds(0.5, 2) - odds(None, 2) == pytest.approx(6.0 * math.log(8.0 / 2.0))
+
+
 def test_a_step_is_believed_as_far_as_speed_and_noise_reach():
     """Two poses of one frame's distance, each with noise of its own, share the prior's error, as in a flight.
 

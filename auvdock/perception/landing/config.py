@@ -7,6 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from auvdock.core.checked import Checked
 from auvdock.core.limits import Count, NotNegative, Positive, at_least
+from auvdock.perception.landing.tag_families import TagFamily
 from auvdock.perception.tracker import TrackerCfg
 
 __all__ = [
@@ -69,6 +70,10 @@ class LightLevelCfg(Checked):
 class TagLevelCfg(Checked):
     """Level II: the tag."""
 
+    family: TagFamily = "36h11"
+    """36h11, 36h10, 25h9, 16h5 (AprilTag) or 4x4, 5x5, 6x6, 7x7 (ArUco)."""
+    clahe: bool = False
+    """Equalise contrast before the tag is looked for."""
     corner_sigma_px: NotNegative = 0.25
     """In addition to what the detector says of its corners; ours. Blur pulls all corners inwards by some hundredths of
     a pixel, in every frame alike: over two seconds of frames this white noise weighs what a constant 0.04 px does."""

@@ -1,4 +1,4 @@
-"""Detectors of AprilTags (family 36h11) on frames, by name."""
+"""Detectors of square tags on frames, by name."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 from auvdock.core.arrays import Array, Image
 from auvdock.core.contracts import Frame, RegionOfInterest, TagDetection
 from auvdock.core.errors import ConfigError
-from auvdock.numeric.constants import TAG_SQUARE_CELLS
 from auvdock.perception.landing.tag_edges import corners_from_lines, lines_through, refined_corners
+from auvdock.perception.landing.tag_families import TagCodes, TagFamily, equalised
 from auvdock.perception.solvers import homography
 
 __all__ = ["TAG_DETECTORS", "AprilTagDetector", "ContourTagDetector", "TagDetector", "make_tag_detector"]
 
 TAG_DETECTORS = ("apriltag", "contour")
 """Names of the tag detectors."""
-_CODE = 6
 _MIN_REGION_PX = 12
 _SMALL_PX = 120
 """A region below this is enlarged twice before it is searched: cells of two pixels are not read reliably."""
@@ -36,42 +35,38 @@ class TagDetector(Protocol):
         ...
 
 
-def make_tag_detector(name: str, numbers: tuple[int, ...] | None = None) -> TagDetector:
+def make_tag_detector(
+    name: str, numbers: tuple[int, ...] | None = None, family: TagFamily = "36h11", clahe: bool = False
+) -> TagDetector:
     """A tag detector by name.
 
     Args:
         name: one of `TAG_DETECTORS`.
-        numbers: the tags of the family that are looked for; None for all 587. To compare a square that is no tag with
-            all of them takes OpenCV 2.4 ms, more than everything else that it does with a region.
+        numbers: the tags of the family that are looked for; None for all. To compare a square that is no tag with the
+            587 of 36h11 takes OpenCV 2.4 ms, more than everything else that it does with a region.
+        family: of the tags.
+        clahe: equalise contrast before looking; corners are measured in the frame as it is all the same.
 
     Raises:
-        ConfigError: no detector of that name.
+        ConfigError: no detector or family of that name, or a number that the family does not have.
     """
     if name == "apriltag":
-        return AprilTagDetector(numbers)
+        return AprilTagDetector(numbers, family, clahe)
     if name == "contour":
-        return ContourTagDetector(numbers)
+        return ContourTagDetector(numbers, family, clahe)
     raise ConfigError("tag_detector", name, f"one of {', '.join(TAG_DETECTORS)}")
-
-
-class _Codes:
-    """The codes of those tags of the family that are looked for."""
-
-    def __init__(self, numbers: tuple[int, ...] | None) -> None:
-        """Take the codes of `numbers` out of the family; None takes all."""
-        family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-        self.numbers = tuple(range(len(family.bytesList))) if numbers is None else numbers
-        codes = np.ascontiguousarray(family.bytesList[list(self.numbers)])
-        self.dictionary = cv2.aruco.Dictionary(codes, family.markerSize, family.maxCorrectionBits)
 
 
 class AprilTagDetector:
     """OpenCV's detector of the family, with corners from lines through sub-pixel edges."""
 
-    def __init__(self, numbers: tuple[int, ...] | None = None) -> None:
+    def __init__(
+        self, numbers: tuple[int, ...] | None = None, family: TagFamily = "36h11", clahe: bool = False
+    ) -> None:
         """Set OpenCV's detector up for the tags of these numbers, None for the whole family."""
-        self._numbers = numbers
-        self._codes = _Codes(numbers)
+        self._made_of = numbers, family, clahe
+        self._clahe = clahe
+        self._codes = TagCodes(family, numbers)
         settings = cv2.aruco.DetectorParameters()
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
         settings.adaptiveThreshWinSizeMin, settings.adaptiveThreshWinSizeMax = 9, 29
@@ -79,15 +74,16 @@ class AprilTagDetector:
         # A tag in haze has little contrast: OpenCV's 7 levels would drown it.
         settings.adaptiveThreshConstant = 3
         settings.minMarkerPerimeterRate = 0.05
-        # The white margin's outline runs one cell outside the black square, its corners 0.044 of the perimeter away. At
-        # OpenCV's 0.125 the two count as one candidate, and of a tag turned by some 30° the outer one is often kept,
-        # which holds no code. Far below, the inner side of the black border is taken for a square of its own.
-        settings.minMarkerDistanceRate = 0.04
+        # The white margin's outline runs one cell outside the black square, its corners 0.35 / cells of the perimeter
+        # away (0.044 for the eight cells of 36h11). At OpenCV's 0.125 the two count as one candidate, and of a tag
+        # turned by some 30° the outer one is often kept, which holds no code. Far below, the inner side of the black
+        # border is taken for a square of its own.
+        settings.minMarkerDistanceRate = 0.32 / self._codes.cells
         self._detector = cv2.aruco.ArucoDetector(self._codes.dictionary, settings)
 
-    def __reduce__(self) -> tuple[type[AprilTagDetector], tuple[tuple[int, ...] | None]]:
+    def __reduce__(self) -> tuple[type[AprilTagDetector], tuple[tuple[int, ...] | None, TagFamily, bool]]:
         """OpenCV's parts cannot be pickled: they are made anew."""
-        return AprilTagDetector, (self._numbers,)
+        return AprilTagDetector, self._made_of
 
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
         """Detect in the whole frame, or only in the given regions when there are any."""
@@ -103,7 +99,8 @@ class AprilTagDetector:
     def _search(self, frame: Frame, patch: Image, origin: Array, scale: float) -> list[TagDetection]:
         """Tags of one patch, searched at a scale; their corners are of the full resolution all the same."""
         method = cv2.INTER_CUBIC if scale > 1.0 else cv2.INTER_AREA
-        searched = patch if scale == 1.0 else cv2.resize(patch, None, fx=scale, fy=scale, interpolation=method)
+        scaled = patch if scale == 1.0 else cv2.resize(patch, None, fx=scale, fy=scale, interpolation=method)
+        searched = equalised(np.asarray(scaled, dtype=np.uint8)) if self._clahe else scaled
         corners, ids, _ = self._detector.detectMarkers(searched)
         # Without a tag `ids` may be None, which OpenCV's stubs do not say; `corners` is then empty.
         places = np.asarray(ids).ravel()
@@ -111,7 +108,7 @@ class AprilTagDetector:
         for index, quad in enumerate(corners):
             # Pixel centres have integer coordinates; those of another scale lie between.
             rough = (np.asarray(quad, dtype=np.float64).reshape(4, 2) + 0.5) / scale - 0.5 + origin
-            refined = refined_corners(frame, rough)
+            refined = refined_corners(frame, rough, self._codes.cells)
             if refined is not None:
                 found.append(TagDetection(self._codes.numbers[int(places[index])], *refined))
         return found
@@ -120,25 +117,30 @@ class AprilTagDetector:
 class ContourTagDetector:
     """Paper C's way: smoothing, Canny, contours, quadrilaterals, code; corners from lines through the contour."""
 
-    def __init__(self, numbers: tuple[int, ...] | None = None) -> None:
+    def __init__(
+        self, numbers: tuple[int, ...] | None = None, family: TagFamily = "36h11", clahe: bool = False
+    ) -> None:
         """Take the codes of the tags of these numbers, None for the whole family."""
-        self._numbers = numbers
-        self._codes = _Codes(numbers)
+        self._made_of = numbers, family, clahe
+        self._clahe = clahe
+        self._codes = TagCodes(family, numbers)
 
-    def __reduce__(self) -> tuple[type[ContourTagDetector], tuple[tuple[int, ...] | None]]:
+    def __reduce__(self) -> tuple[type[ContourTagDetector], tuple[tuple[int, ...] | None, TagFamily, bool]]:
         """OpenCV's parts cannot be pickled: they are made anew."""
-        return ContourTagDetector, (self._numbers,)
+        return ContourTagDetector, self._made_of
 
     def detect(self, frame: Frame, regions: Sequence[RegionOfInterest] = ()) -> tuple[TagDetection, ...]:
         """Detect in the whole frame, or only in the given regions when there are any."""
         found: dict[int, TagDetection] = {}
         for patch, origin in _patches(frame, regions):
             smooth = np.asarray(cv2.medianBlur(cv2.GaussianBlur(patch, (3, 3), 0.0), 3), dtype=np.uint8)
+            if self._clahe:  # noise is smoothed first: raised, it breaks the contours
+                smooth = equalised(smooth)
             high, _ = cv2.threshold(smooth, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
             edges = cv2.Canny(smooth, 0.4 * high, 0.8 * high)
             contours, _ = cv2.findContours(edges, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
             for contour in contours:
-                quad = _quadrilateral(np.asarray(contour, dtype=np.int32))
+                quad = _quadrilateral(np.asarray(contour, dtype=np.int32), self._codes.cells)
                 if quad is None:
                     continue
                 number = self._read(smooth, quad)
@@ -152,20 +154,21 @@ class ContourTagDetector:
 
     def _read(self, grey: Image, quad: Array) -> tuple[int, int] | None:
         """(number, quarter turns) of the code within a quadrilateral, None if it is none of the family's."""
-        side = 6 * TAG_SQUARE_CELLS
+        edge = self._codes.cells
+        side = 6 * edge
         target = np.array([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]]) - 0.5
         warp = homography(quad, target)
         if warp is None:
             return None
         flat = cv2.warpPerspective(grey, warp, (side, side))
         level, _ = cv2.threshold(flat, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
-        cells = np.asarray(flat, dtype=np.float64).reshape(TAG_SQUARE_CELLS, 6, TAG_SQUARE_CELLS, 6)
+        cells = np.asarray(flat, dtype=np.float64).reshape(edge, 6, edge, 6)
         cells = cells[:, 1:5, :, 1:5].mean(axis=(1, 3))
         bits = (cells > level).astype(np.uint8)
         border = np.concatenate([bits[0], bits[-1], bits[1:-1, 0], bits[1:-1, -1]])
         if int(border.sum()) > 2:
             return None
-        code = np.ascontiguousarray(bits[1 : 1 + _CODE, 1 : 1 + _CODE])
+        code = np.ascontiguousarray(bits[1:-1, 1:-1])
         read, place, turns = self._codes.dictionary.identify(code, 0.6)
         return (self._codes.numbers[int(place)], int(turns)) if read else None
 
@@ -198,13 +201,16 @@ def _grey(image: Image) -> Image:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
 
 
-def _quadrilateral(contour: NDArray[np.int32]) -> Array | None:
-    """(4, 2) corners of a contour that is a convex quadrilateral, clockwise in the image; None if it is none."""
+def _quadrilateral(contour: NDArray[np.int32], cells: int) -> Array | None:
+    """(4, 2) corners of a contour that is a convex quadrilateral, clockwise in the image; None if it is none.
+
+    A square whose cells, so many along an edge, are less than a pixel wide holds no code.
+    """
     length = cv2.arcLength(contour, True)
-    if length < 4 * TAG_SQUARE_CELLS:
+    if length < 4 * cells:
         return None
     quad = cv2.approxPolyDP(contour, 0.04 * length, True)
-    if len(quad) != 4 or not cv2.isContourConvex(quad) or abs(cv2.contourArea(quad)) < TAG_SQUARE_CELLS**2:
+    if len(quad) != 4 or not cv2.isContourConvex(quad) or abs(cv2.contourArea(quad)) < cells**2:
         return None
     corners = np.asarray(quad, dtype=np.float64).reshape(4, 2)
     a, b = corners[1] - corners[0], corners[2] - corners[0]

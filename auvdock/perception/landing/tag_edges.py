@@ -47,7 +47,7 @@ class Lines(NamedTuple):
         return float((4.0 * self.sigma * self.sigma / self.used).max())
 
 
-def refined_corners(frame: Frame, corners_px: Array) -> tuple[Array, float] | None:
+def refined_corners(frame: Frame, corners_px: Array, cells: int = TAG_SQUARE_CELLS) -> tuple[Array, float] | None:
     """((4, 2) corners in pixels, standard deviation per axis) from corners good to a cell; None without four edges.
 
     Across each side the edge is where the centre of the gradient of light lies: codes are made linear first, for in a
@@ -58,12 +58,13 @@ def refined_corners(frame: Frame, corners_px: Array) -> tuple[Array, float] | No
     Args:
         frame: the image, black square on white.
         corners_px: (4, 2) rough corners, clockwise in the image.
+        cells: along an edge of the black square.
     """
     camera = frame.camera
     patch = _patch_around(frame, corners_px)
     corners, variance = corners_px, 0.0
     for _ in range(_PASSES):
-        edges = _edge_points(patch, corners)
+        edges = _edge_points(patch, corners, cells)
         if edges is None:
             return None
         points, good = edges
@@ -155,7 +156,7 @@ def _patch_around(frame: Frame, corners_px: Array) -> _Patch:
     return _Patch(patch[:, :, channel], np.array([float(x0), float(y0)]), light)
 
 
-def _edge_points(patch: _Patch, corners: Array) -> tuple[Array, BoolArray] | None:
+def _edge_points(patch: _Patch, corners: Array, cells: int) -> tuple[Array, BoolArray] | None:
     """(4, n, 2) sub-pixel points of the edges from black to white along the sides, and which count; None without."""
     side = np.concatenate([corners[1:], corners[:1]]) - corners
     length = np.hypot(side[:, 0], side[:, 1])
@@ -165,7 +166,7 @@ def _edge_points(patch: _Patch, corners: Array) -> tuple[Array, BoolArray] | Non
     along = side / length[:, None]
     # Clockwise in an image whose y points down: outwards is to the left of the way.
     outward = np.column_stack([along[:, 1], -along[:, 0]])
-    reach = min(max(0.7 * shortest / TAG_SQUARE_CELLS, 1.5), 8.0)
+    reach = min(max(0.7 * shortest / cells, 1.5), 8.0)
     share = np.linspace(_FROM, _TO, int(min(max(longest / 1.5, 8.0), 60.0)))
     base = corners[:, None] + share[:, None] * side[:, None]
     offset = np.arange(-reach, reach + 0.5 * _STEP_PX, _STEP_PX)
