@@ -60,6 +60,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.reproduce_halo:run_halo",
         "the light about a lamp against single photons",
     ),
+    ("reproduce", "vehicle"): (
+        "auvdock.cli.reproduce_vehicle:run_vehicle",
+        "the vehicles' speeds, stability and turning beside published runs",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("fit-landing",): (

@@ -41,6 +41,8 @@ class SimCfg(Checked):
 
     vehicle: str = "remus_hybrid"
     """Vehicle preset."""
+    battery_v: Annotated[float, between(10.0, 20.0)] | None = None
+    """Voltage of thrusters with measured curves, in place of the vehicle's own."""
     current: CurrentCfg = CurrentCfg()
     sensors: SensorCfg = SensorCfg()
     physics_hz: Annotated[float, between(100.0, 2000.0, "contacts need some 100 Hz")] = 120.0
@@ -86,13 +88,14 @@ class Simulator:
         """
         self.cfg = cfg
         self.station = station
-        self.vehicle = vehicle if vehicle is not None else load_vehicle(cfg.vehicle)
+        self.vehicle = vehicle if vehicle is not None else load_vehicle(cfg.vehicle, cfg.battery_v)
         self._dt_s = 1.0 / cfg.physics_hz
         self._dock = make_dock(station, self.vehicle)
         self.model = build_model(self.vehicle, self._dock, self._dt_s)
         self._data = mujoco.MjData(self.model)
         self.T_world_station = make_transform(np.eye(3), np.array([0.0, 0.0, -station.depth_m]))
         self._actuators = make_actuators(self.vehicle, self._dt_s)
+        self._is_metered = bool(self._actuators["has_curve"].any())
         self._pieces = cut_hull(self.vehicle)
         self._clearance_m = clearance_m(self._pieces, self._actuators)
         self._hull = make_hull(self.vehicle, self._clearance_m)
@@ -172,7 +175,7 @@ class Simulator:
         nu = np.zeros(6) if nu_relative_body is None else nu_relative_body
         check_shape("nu_relative_body", nu, (6,))
         qpos = np.concatenate([position_world_m, quat_wxyz / length]).astype(np.float64)
-        run = Run(self._dt_s, self._dock.watch, qpos[:3], 0, 0.0, 0.0).packed()
+        run = Run(self._dt_s, self._dock.watch, qpos[:3], 0, 0.0, 0.0, 0.0).packed()
         if is_absurd(qpos, nu.astype(np.float64), run):
             raise ValueError(f"cannot start at {position_world_m} with {nu}")
         water_rng, sensor_rng = rng.spawn(2)
@@ -285,6 +288,7 @@ class Simulator:
             entry_lateral_m=entry.lateral_m if entry else None,
             entry_vertical_m=entry.vertical_m if entry else None,
             energy_j=float(self._run["work_j"][0]),
+            electrical_j=float(self._run["electrical_j"][0]) if self._is_metered else None,
             path_length_m=float(self._run["path_m"][0]),
             immersed_share=float(self._hull["immersed"][0]),
             broached_s=self._broached_s,
