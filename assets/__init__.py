@@ -1,4 +1,4 @@
-"""Data that ships with auvdock: vehicles, stations, waters, levels, fitted models, scattering and halos."""
+"""Data that ships with auvdock: vehicles, thrusters, stations, waters, levels, fitted models, scattering and halos."""
 
 from importlib.resources import files
 from importlib.resources.abc import Traversable

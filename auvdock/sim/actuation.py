@@ -16,7 +16,9 @@ from auvdock.numeric.records import Record, Records
 __all__ = ["Actuator", "make_actuators"]
 
 _RHO_KG_M3 = 1025.0
-_NO_CURVE = np.zeros(38)
+_NODES = 38
+"""Of a thruster's curve: 36 measured points (`assets/thrusters`) and the two edges of its dead band."""
+_NO_CURVE = np.zeros(_NODES)
 
 
 @dataclass
@@ -33,11 +35,11 @@ class Actuator(Record):
     dead_band: float
     """Commands of a smaller magnitude do nothing."""
     has_curve: bool
-    curve_command: Annotated[Array, 38]
+    curve_command: Annotated[Array, _NODES]
     """Nodes of the curve; 0 without one."""
-    curve_effort: Annotated[Array, 38]
+    curve_effort: Annotated[Array, _NODES]
     """Thrust there over `max_force_n`."""
-    curve_power_w: Annotated[Array, 38]
+    curve_power_w: Annotated[Array, _NODES]
     """Electrical power there."""
     max_force_n: float
     """At state 1; 0 for a fin."""

@@ -153,6 +153,7 @@ def test_configuration_refuses_nonsense():
 
 def test_a_way_by_old_velocities_is_doubted_until_the_next_fix():
     state = FILTER.start(sighting((20.0, 0.0), 0.0))
+    assert state is not None
     fresh = stale = state
     for _ in range(60):
         fresh, stale = FILTER.predict(fresh, (0.5, 0.0)), FILTER.predict(stale, (0.5, 0.0), 0.5)

@@ -164,13 +164,13 @@ def test_levels_that_disagree():
 
 def test_without_bottom_lock_the_covariance_grows_faster():
     """One second by a velocity 0.3 s old: 2 (0.15 × 0.3)² 0.3 m² more variance of each coordinate."""
-    start, ahead = (
-        Senses(Descent(np.array([0.0, 0.0, 3.0]), 0.0, 0.5, 2.5), np.random.default_rng(0)).proprioception(0.0),
-        [],
-    )
+    flight = Descent(np.array([0.0, 0.0, 3.0]), 0.0, 0.5, 2.5)
+    start = Senses(flight, np.random.default_rng(0)).proprioception(0.0)
+    ahead: list[Array] = []
     for age_s in (0.0, 0.3):
         found = LandingFilter(FilterCfg(), AttitudeCfg(), CAMERA)
         found.place(make_transform(measured_attitude(start), np.array([0.0, 0.0, 3.0])), 1e-4 * np.eye(6), start)
-        _, covariance = found.expected(dataclasses.replace(start, time_s=1.0, ground_age_s=age_s))
-        ahead.append(np.diag(covariance)[:3])
+        expected = found.expected(dataclasses.replace(start, time_s=1.0, ground_age_s=age_s))
+        assert expected is not None
+        ahead.append(np.diag(expected[1])[:3])
     np.testing.assert_allclose(ahead[1] - ahead[0], 2.0 * 0.045**2 * 0.3, rtol=1e-6)

@@ -195,6 +195,7 @@ def test_nonsense_is_refused():
 def test_the_doubt_grows_with_the_age_of_the_velocity():
     """Two seconds by a velocity half a second old: 2 (0.15 × 0.5)² 0.5 m²/s more variance than by a fresh one."""
     state = FILTER.start(Track(0.0).pose(), Track(0.0).senses)
+    assert state is not None
     fresh = stale = state
     for step in range(round(2.0 / DT_S)):
         senses = Track(step * DT_S).senses
