@@ -6,6 +6,7 @@ the velocity over ground is that through the water and the current that both las
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -101,6 +102,6 @@ class Dvl:
         if time_s < self._next_s - _ROUNDING_S:
             return False
         period_s = self._cfg.ping_period_s
-        while period_s > 0.0 and self._next_s <= time_s + _ROUNDING_S:
-            self._next_s += period_s
+        if period_s > 0.0:
+            self._next_s += period_s * (math.floor((time_s - self._next_s + _ROUNDING_S) / period_s) + 1)
         return float(self._rng.random()) >= self._cfg.lost_share
