@@ -49,9 +49,11 @@ class ThrusterCfg(Checked):
     def __post_init__(self) -> None:
         """Refuse curves that do not grow with the command: they could not be inverted."""
         for index, supply in enumerate(self.supplies):
-            for name in ("thrust_n", "power_w"):
-                if len(getattr(supply, name)) != len(self.pulse_us):
-                    raise ConfigError(f"supplies[{index}].{name}", len(self.pulse_us), "a number for each pulse")
+            count = len(self.pulse_us)
+            if len(supply.thrust_n) != count:
+                raise ConfigError(f"supplies[{index}].thrust_n", len(supply.thrust_n), f"{count} numbers, one a pulse")
+            if len(supply.power_w) != count:
+                raise ConfigError(f"supplies[{index}].power_w", len(supply.power_w), f"{count} numbers, one a pulse")
             command, thrust, _ = _nodes(self, supply)
             if np.any(np.diff(command) < 0.0) or np.any(np.diff(thrust) < 0.0):
                 raise ConfigError(f"supplies[{index}].thrust_n", supply.voltage_v, "thrust that grows with the pulse")
