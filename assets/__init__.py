@@ -1,4 +1,4 @@
-"""Data that ships with auvdock: vehicles, stations, waters, levels, fitted models, scattering, halos and networks."""
+"""Data that ships: vehicles, thrusters, stations, waters, levels, fitted models, scattering, halos and networks."""
 
 from importlib.resources import files
 from importlib.resources.abc import Traversable

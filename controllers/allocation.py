@@ -19,9 +19,10 @@ from auvdock.controllers.planar_groups import (
     reach_along,
     solve_planar,
 )
-from auvdock.core.arrays import Array, check_shape
+from auvdock.core.arrays import Array, IntArray, check_shape
 from auvdock.core.checked import Checked
 from auvdock.core.limits import Positive, between
+from auvdock.core.thruster import ThrusterCurve, load_curve
 from auvdock.core.vehicle import VehicleCfg
 
 __all__ = ["AllocationCfg", "ThrustAllocator"]
@@ -47,10 +48,12 @@ class AllocationCfg(Checked):
 class ThrustAllocator:
     """Solves min cᵀ W c subject to B(u) c = τ with |c| ≤ 1 (Fossen 2011, section 12.3.2; Durham 1993 for the limits).
 
-    B(u) has a thruster's wrench at command 1 in its column, or a fin's times u |u|. Roll, or any other axis on which
-    no thruster acts, is left alone. Actuators that share an axis form a group (axial, lateral, vertical for a torpedo
-    with tunnel thrusters; one of all six axes for vectored thrusters above or below the origin); a group whose wrench
-    is out of reach gives the longest reachable wrench in the same direction, and the other groups are not touched.
+    c are efforts, which are the commands themselves unless a thruster's curve was measured: the curve's inverse then
+    makes the command, and c = 1 is the greatest thrust of its weaker way. B(u) has a thruster's wrench at c = 1 in its
+    column, or a fin's times u |u|. Roll, or any other axis on which no thruster acts, is left alone. Actuators that
+    share an axis form a group (axial, lateral, vertical for a torpedo with tunnel thrusters; one of all six axes for
+    vectored thrusters above or below the origin); a group whose wrench is out of reach gives the longest reachable
+    wrench in the same direction, and the other groups are not touched.
     """
 
     def __init__(self, vehicle: VehicleCfg, cfg: AllocationCfg | None = None) -> None:
@@ -73,6 +76,7 @@ class ThrustAllocator:
         ]
         self._dead_band = np.array([actuator.dead_band for actuator in vehicle.actuators], dtype=np.float64)
         self._count = len(self._dead_band)
+        self._curves = _curves(vehicle)
         members: list[Member] = []
         rows_of_groups: list[PlanarGroup] = []
         for group in self._groups:
@@ -97,7 +101,8 @@ class ThrustAllocator:
 
         Returns:
             Commands with the thrusters' dead band compensated: a command inside the dead band would give nothing, so
-            it becomes 0 or the band's edge, whichever is nearer.
+            it becomes 0 or the band's edge, whichever is nearer. Where a thruster's curve was measured, the command is
+            the curve's inverse, which never lies in its dead band.
         """
         return self.solve(wrench_body, surge_m_s)[0]
 
@@ -124,6 +129,8 @@ class ThrustAllocator:
                     group.add_wrench(achieved, commands, effect)
                     for column, value in zip(group.columns, commands, strict=True):
                         values[column] = leave_dead_band(value, float(self._dead_band[column]))
+        for curve, columns in self._curves:
+            values[columns] = curve.command_for(values[columns])
         return values, achieved
 
 
@@ -213,6 +220,15 @@ class _Group:
         wanted = np.array([wrench[row] for row in self.rows])
         commands: list[float] = (weighted.T @ (np.linalg.pinv(weighted @ matrix.T) @ wanted)).tolist()
         return commands
+
+
+def _curves(vehicle: VehicleCfg) -> list[tuple[ThrusterCurve, IntArray]]:
+    """The measured curves, each with the actuators (k,) that have it."""
+    columns: dict[str, list[int]] = {}
+    for index, actuator in enumerate(vehicle.actuators):
+        if actuator.curve:
+            columns.setdefault(actuator.curve, []).append(index)
+    return [(load_curve(name, vehicle.voltage_v), np.array(found)) for name, found in columns.items()]
 
 
 def _gram(members: Sequence[Member], fins: bool) -> Array:

@@ -81,7 +81,7 @@ class VehicleWorld(ABC):
         with located("world.station."):
             _ = station.layout  # before whoever uses it: here it is known where its settings lie
         with located("world.sim."):
-            vehicle = load_vehicle(cfg.sim.vehicle)
+            vehicle = load_vehicle(cfg.sim.vehicle, cfg.sim.battery_v)
         with located("world.camera."):
             self.camera = make_camera(vehicle)
         with located("world."):

@@ -65,6 +65,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.reproduce_models:run_models",
         "sizes of the papers' networks and ablation rows beside ours",
     ),
+    ("reproduce", "vehicle"): (
+        "auvdock.cli.reproduce_vehicle:run_vehicle",
+        "the vehicles' speeds, stability and turning beside published runs",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("fit-landing",): (

@@ -267,10 +267,13 @@ class Proprioception:
         euler_zyx_rad: (3,) roll, pitch, yaw of the body (x forward, y left, z up) in the world: inclinometer and
             compass. A positive pitch is nose down, a positive yaw is to port.
         angular_velocity_rad_s: (3,) p, q, r in the body frame: gyroscopes.
-        velocity_ground_m_s: (3,) velocity over ground in the body frame: DVL bottom lock.
-        velocity_water_m_s: (3,) velocity through the water in the body frame: DVL water track.
+        velocity_ground_m_s: (3,) velocity over ground in the body frame: DVL bottom lock, or what the log makes of the
+            last one (`sim.dvl`).
+        velocity_water_m_s: (3,) velocity through the water in the body frame: DVL water track, or the last one.
         contact: True while the touch switch is pressed: the bow's, in landing the underside's.
         latched: True once the station has reported over its short link that the latch closed.
+        ground_age_s: time since the last bottom lock.
+        water_age_s: time since the last water track.
     """
 
     time_s: float
@@ -281,6 +284,8 @@ class Proprioception:
     velocity_water_m_s: Array
     contact: bool = False
     latched: bool = False
+    ground_age_s: float = 0.0
+    water_age_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check shapes."""

@@ -41,6 +41,7 @@ _GREATEST: dict[str, tuple[float, str]] = {
     "nm": (1e6, "nm"),
     "n": (1e9, "N"),
     "w": (1e6, "W"),
+    "v": (1e5, "V"),
     "px": (1e6, "pixels"),
 }
 """Greatest magnitude by the end of a setting's name, and what a message calls it."""

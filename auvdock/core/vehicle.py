@@ -7,6 +7,7 @@ which axes they are: `_marine` or `_body` (x forward, y port, z up).
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from auvdock.core.errors import ConfigError
 from auvdock.core.limits import Positive
 from auvdock.core.marine import flip_matrix, flip_twist, flip_vector
 from auvdock.core.strict import load_toml
+from auvdock.core.thruster import ThrusterCurve, load_curve
 
 __all__ = ["ActuatorCfg", "HullPartCfg", "MountCfg", "VehicleCfg", "load_vehicle"]
 
@@ -48,8 +50,8 @@ class Coefficient(Checked):
 class ActuatorCfg(Checked):
     """A thruster or a fin.
 
-    A thruster gives force = max_force_n × command along `direction` at `position_m`. A fin gives the wrench
-    `fin_wrench` × u |u| × angle, with angle = max_angle_rad × command.
+    A thruster gives force = max_force_n × command along `direction` at `position_m`, or by `curve` what its maker
+    measured. A fin gives the wrench `fin_wrench` × u |u| × angle, with angle = max_angle_rad × command.
     """
 
     name: str
@@ -63,13 +65,16 @@ class ActuatorCfg(Checked):
     direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
     """Unit direction of positive thrust, marine axes."""
     max_force_n: float = 0.0
-    """Thrust at command 1."""
+    """Thrust at command 1; unused with a curve."""
+    curve: str = ""
+    """Thruster preset (`assets/thrusters`) whose measured curve says the thrust at the vehicle's voltage; none for a
+    thrust that is proportional to the command."""
     disc_diameter_m: float = 0.1
     """Propeller diameter, for the power that the thrust costs."""
     time_constant_s: Positive = 0.1
     """First-order lag."""
     dead_band: float = 0.0
-    """Commands below this magnitude give nothing."""
+    """Commands below this magnitude give nothing; a curve has a dead band of its own."""
     max_angle_rad: float = 0.0
     """Fin angle at command 1."""
     fin_wrench: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -139,6 +144,8 @@ class VehicleCfg(Checked):
     actuators: tuple[ActuatorCfg, ...]
     bow_camera: MountCfg
     belly_camera: MountCfg
+    voltage_v: float = 16.0
+    """Supply of the thrusters that have a curve."""
     seat_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Middle of the round that comes to rest in a landing station's guides, marine axes: of the hull, or of a keel."""
     hull: tuple[HullPartCfg, ...] = ()
@@ -223,13 +230,35 @@ class VehicleCfg(Checked):
         """Names in the order of `Command.values`."""
         return tuple(actuator.name for actuator in self.actuators)
 
+    def curve(self, actuator: ActuatorCfg) -> ThrusterCurve | None:
+        """The measured curve of a thruster at the vehicle's voltage, None if it has none.
+
+        Raises:
+            ConfigError: no such preset, or a voltage at which it was not measured.
+        """
+        return load_curve(actuator.curve, self.voltage_v) if actuator.curve else None
+
+    def full_force_n(self, actuator: ActuatorCfg) -> float:
+        """A thruster's force at effort 1; one with a curve gives more than that the stronger way."""
+        curve = self.curve(actuator)
+        return actuator.max_force_n if curve is None else curve.reference_n
+
+    def efforts(self, commands: Array) -> Array:
+        """(n,) force over `full_force_n`, or angle over the greatest, that commands (n,) in [-1, 1] settle at."""
+        values = np.where(np.abs(commands) < [actuator.dead_band for actuator in self.actuators], 0.0, commands)
+        for index, actuator in enumerate(self.actuators):
+            curve = self.curve(actuator)
+            if curve is not None:
+                values[index] = curve.effort(commands[index])
+        return values
+
     @cached_property
     def thruster_wrenches_body(self) -> Array:
-        """(6, n) wrench of each actuator at command 1, package body axes; a fin's column is for u |u| = 1 m²/s²."""
+        """(6, n) wrench of each actuator at effort 1, package body axes; a fin's column is for u |u| = 1 m²/s²."""
         columns: list[Array] = []
         for actuator in self.actuators:
             if actuator.kind == "thruster":
-                force = np.array(actuator.direction) * actuator.max_force_n
+                force = np.array(actuator.direction) * self.full_force_n(actuator)
                 wrench = np.concatenate([force, np.cross(np.array(actuator.position_m), force)])
             else:
                 wrench = np.array(actuator.fin_wrench) * actuator.max_angle_rad
@@ -237,13 +266,22 @@ class VehicleCfg(Checked):
         return np.column_stack(columns)
 
 
-def load_vehicle(name: str) -> VehicleCfg:
+def load_vehicle(name: str, voltage_v: float | None = None) -> VehicleCfg:
     """A vehicle preset by name.
 
+    Args:
+        name: of the preset.
+        voltage_v: supply of its thrusters, in place of the preset's.
+
     Raises:
-        ConfigError: no such preset, or a file that does not fit.
+        ConfigError: no such preset, a file that does not fit, or a voltage at which its thrusters were not measured.
     """
-    return load_toml(VehicleCfg, asset("vehicles", name))
+    vehicle = load_toml(VehicleCfg, asset("vehicles", name))
+    if voltage_v is not None:
+        vehicle = dataclasses.replace(vehicle, voltage_v=voltage_v)
+    for actuator in vehicle.actuators:
+        vehicle.curve(actuator)
+    return vehicle
 
 
 def _matrix(coefficients: tuple[Coefficient, ...], field: str) -> Array:

@@ -85,8 +85,10 @@ class EpisodeResult:
     time_s: float
     path_length_m: float
     energy_j: float
-    """Hydraulic work of the thrusters by actuator-disc theory (`auvdock.sim.actuation.Actuators.power_w`)."""
+    """Hydraulic work of the thrusters by actuator-disc theory (`auvdock.sim.stepping.hydraulic_power_w`)."""
     peak_contact_force_n: float
+    electrical_j: float | None = None
+    """Electrical work of the thrusters by their maker's measurements; None where there are none."""
     lateral_error_m: float | None = None
     """Sideways distance of the nose from the tube's axis as it crosses the throat; positive is +y of the station."""
     vertical_error_m: float | None = None

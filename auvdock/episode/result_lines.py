@@ -35,6 +35,7 @@ def shared_lines(result: EpisodeResult) -> list[Line]:
         Line("time", result.time_s, "{:.1f} s"),
         Line("path length", result.path_length_m, "{:.1f} m"),
         Line("thruster work", result.energy_j, "{:.0f} J"),
+        *([] if result.electrical_j is None else [Line("electrical work", result.electrical_j, "{:.0f} J")]),
         Line("peak contact force", result.peak_contact_force_n, "{:.0f} N"),
         Line("approaches", result.attempts, "{:d}"),
         Line("measured poses", result.measured_poses, "{:d}"),

@@ -133,6 +133,7 @@ class EpisodeRunner:
             time_s=truth.time_s,
             path_length_m=truth.path_length_m,
             energy_j=truth.energy_j,
+            electrical_j=truth.electrical_j,
             peak_contact_force_n=truth.peak_contact_force_n,
             attempts=flight.attempts,
             seed=seed,

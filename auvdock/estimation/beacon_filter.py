@@ -22,6 +22,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 from auvdock.core.limits import Count, Positive
+from auvdock.numeric.motion import stale_walk_m2_s
 
 __all__ = ["BeaconFilter", "BeaconFilterCfg", "BeaconState", "Hypothesis", "Sighting"]
 
@@ -108,6 +109,7 @@ class BeaconState(NamedTuple):
         bank: hypotheses as of the last fix, their means dead-reckoned to the present by `moved_m`.
         moved_m: way over ground since the last fix, compass axes.
         since_fix_s: time since the last accepted fix.
+        stale_m2: variance of the way since then for want of fresh velocities, along each axis.
         fixes: accepted since the bank began.
         refused: since the last accepted one.
         restarts: how often the bank began anew.
@@ -133,6 +135,7 @@ class BeaconState(NamedTuple):
     finest_rad: float = math.inf
     mean_m: tuple[float, float] = (0.0, 0.0)
     axis_yaw_rad: float = 0.0
+    stale_m2: float = 0.0
 
     @property
     def offset_m(self) -> tuple[float, float]:
@@ -222,11 +225,14 @@ class BeaconFilter:
         state = BeaconState(bank, (0.0, 0.0), 0.0, 1, 0, 0, depth_m, sigma_m**2)
         return _measured(state._replace(finest_rad=_POSE_SIGMA_RAD))
 
-    def predict(self, state: BeaconState, ground_compass_m_s: tuple[float, float]) -> BeaconState:
-        """Dead reckoning over one control period with the velocity over ground in level compass axes."""
+    def predict(
+        self, state: BeaconState, ground_compass_m_s: tuple[float, float], ground_age_s: float = 0.0
+    ) -> BeaconState:
+        """Dead reckoning over one control period with the velocity over ground in level compass axes, and its age."""
         x, y = state.moved_m
         moved = (x + ground_compass_m_s[0] * self._dt_s, y + ground_compass_m_s[1] * self._dt_s)
-        return state._replace(moved_m=moved, since_fix_s=state.since_fix_s + self._dt_s)
+        stale_m2 = state.stale_m2 + stale_walk_m2_s(ground_age_s) * self._dt_s
+        return state._replace(moved_m=moved, since_fix_s=state.since_fix_s + self._dt_s, stale_m2=stale_m2)
 
     def update(self, state: BeaconState, sighting: Sighting) -> BeaconState:
         """Fuse a fix, or refuse it as an outlier; after `restart_after` refusals in a row begin anew from it."""
@@ -234,7 +240,7 @@ class BeaconFilter:
             return state
         cfg = self._cfg
         since = state.since_fix_s
-        walk = cfg.position_walk_m_rs**2 * since
+        walk = cfg.position_walk_m_rs**2 * since + state.stale_m2
         process = np.diag([walk, walk, cfg.heading_walk_rad_rs**2 * since])
         noise = np.diag([cfg.bearing_floor_rad**2, sighting.sigma_rad**2 + cfg.azimuth_floor_rad**2])
         # Place of the vehicle when the beam passed: `sighting.moved_m` of the way since the last fix came later.
@@ -266,6 +272,7 @@ class BeaconFilter:
             bank=bank,
             moved_m=(0.0, 0.0),
             since_fix_s=0.0,
+            stale_m2=0.0,
             fixes=state.fixes + 1,
             refused=0,
             finest_rad=min(state.finest_rad, sighting.sigma_rad),

@@ -11,7 +11,7 @@ import numpy as np
 from auvdock.core.arrays import Array
 from auvdock.numeric.cholesky import factorise, forward
 from auvdock.numeric.compiled import compiled
-from auvdock.numeric.motion import Motion
+from auvdock.numeric.motion import Motion, stale_walk_m2_s
 from auvdock.numeric.records import Record, Records
 from auvdock.numeric.rotations import headed, sine_axis
 from auvdock.numeric.scalars import Vector, cross, within_pi
@@ -109,6 +109,9 @@ def advance(
     now, by = after[0], law[0]
     if by.dt_s > 0.0:
         _reckon(now, ground, rate, headed(yaw_rad - now.axis_yaw_rad, R_level_body), by)
+        stale = stale_walk_m2_s(motion[0].ground_age_s) * by.dt_s
+        for i in range(3):
+            now.covariance[i, i] += stale
     of_pose = _fuse_pose(now, yaw_rad, R_level_body, pose, noise, by)
     if impatient and of_pose == REFUSED:
         return of_pose, LEFT_OUT

@@ -60,6 +60,11 @@ class Senses(NamedTuple):
         return x, y, z
 
     @property
+    def ground_age_s(self) -> float:
+        """Time since that was last measured."""
+        return self.motion["ground_age_s"].item()
+
+    @property
     def surge_water_m_s(self) -> float:
         """Forward velocity through the water."""
         return self.motion["water_m_s"].item(0)
@@ -85,6 +90,7 @@ def read_senses(proprioception: Proprioception) -> Senses:
         proprioception.angular_velocity_rad_s,
         proprioception.velocity_ground_m_s,
         proprioception.velocity_water_m_s,
+        proprioception.ground_age_s,
     )
     return Senses(
         time if math.isfinite(time) else 0.0,
@@ -97,9 +103,12 @@ def read_senses(proprioception: Proprioception) -> Senses:
 
 
 @compiled
-def _sense(motion: Records[Motion], euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array) -> None:
+def _sense(
+    motion: Records[Motion], euler_rad: Array, rate_rad_s: Array, ground_m_s: Array, water_m_s: Array, age_s: float
+) -> None:
     """Write `Senses.motion` (1,)."""
     now = motion[0]
+    now.ground_age_s = _finite(age_s)
     now.roll_rad, now.pitch_rad = _finite(euler_rad[0]), _finite(euler_rad[1])
     for i in range(3):
         now.rate_rad_s[i] = _finite(rate_rad_s[i])

@@ -16,13 +16,17 @@ from auvdock.numeric.records import Record, Records
 __all__ = ["Actuator", "make_actuators"]
 
 _RHO_KG_M3 = 1025.0
+_NODES = 38
+"""Of a thruster's curve: 36 measured points (`assets/thrusters`) and the two edges of its dead band."""
+_NO_CURVE = np.zeros(_NODES)
 
 
 @dataclass
 class Actuator(Record):
     """A first-order actuator, stepped exactly for a command held over the step (`stepping.respond`).
 
-    A thruster gives `wrench` times its state, a fin stands at its greatest angle times its state.
+    A thruster gives `wrench` times its state, a fin stands at its greatest angle times its state. The state goes to the
+    command, or where the thruster has a measured curve (`core.thruster`), to the effort that the curve gives for it.
     """
 
     is_fin: bool
@@ -30,6 +34,13 @@ class Actuator(Record):
     """1 − e^(−dt/τ): share of the way to its command that the state goes in a step."""
     dead_band: float
     """Commands of a smaller magnitude do nothing."""
+    has_curve: bool
+    curve_command: Annotated[Array, _NODES]
+    """Nodes of the curve; 0 without one."""
+    curve_effort: Annotated[Array, _NODES]
+    """Thrust there over `max_force_n`."""
+    curve_power_w: Annotated[Array, _NODES]
+    """Electrical power there."""
     max_force_n: float
     """At state 1; 0 for a fin."""
     disc_m_kg: float
@@ -45,7 +56,7 @@ class Actuator(Record):
     command: float = 0.0
     """Held over the step."""
     state: float = 0.0
-    """In [-1, 1]."""
+    """In [-1, 1]; by a curve further the stronger way."""
     immersed: float = 1.0
     """Share that is under water."""
     advance_m_s: float = 0.0
@@ -57,11 +68,16 @@ def make_actuators(vehicle: VehicleCfg, dt_s: float) -> Records[Actuator]:
     rows: list[Actuator] = []
     for part, wrench in zip(vehicle.actuators, vehicle.thruster_wrenches_body.T, strict=True):
         is_fin, thrust = part.kind == "fin", float(np.linalg.norm(wrench[:3]))
+        curve = vehicle.curve(part)
         actuator = Actuator(
             is_fin=is_fin,
             lag=1.0 - math.exp(-dt_s / part.time_constant_s),
             dead_band=part.dead_band,
-            max_force_n=0.0 if is_fin else part.max_force_n,
+            has_curve=curve is not None,
+            curve_command=_NO_CURVE if curve is None else curve.command,
+            curve_effort=_NO_CURVE if curve is None else curve.effort(curve.command),
+            curve_power_w=_NO_CURVE if curve is None else curve.power_w,
+            max_force_n=0.0 if is_fin else vehicle.full_force_n(part),
             disc_m_kg=0.0 if is_fin else 2.0 / (_RHO_KG_M3 * (0.25 * math.pi * part.disc_diameter_m**2)),
             wrench=wrench,
             advance=np.zeros(6) if is_fin or thrust == 0.0 else wrench / thrust,

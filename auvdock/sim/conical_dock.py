@@ -62,6 +62,10 @@ class ConicalDock:
         w, x, y, z = qpos[3:7]
         return Weld((nose[0], nose[1], nose[2] - self.depth_m), (reach, 0.0, 0.0), (w, x, y, z))
 
+    def ground_z_m(self, x_m: float, y_m: float) -> float:
+        """The floor; funnel and tube are open."""
+        return -self._station.depth_m - self._station.floor_below_m
+
     @property
     def latched(self) -> bool:
         """True once the latch has closed."""

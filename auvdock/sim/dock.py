@@ -82,6 +82,10 @@ class Dock(Protocol):
         """
         ...
 
+    def ground_z_m(self, x_m: float, y_m: float) -> float:
+        """Height in the world of what lies under the water at a place: floor or station."""
+        ...
+
     @property
     def latched(self) -> bool:
         """True once the latch has closed."""

@@ -11,7 +11,7 @@ from auvdock.core.arrays import Array
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.numeric.records import Record, Records
 
-__all__ = ["GRAVITY_M_S2", "Hull", "make_hull"]
+__all__ = ["GRAVITY_M_S2", "Hull", "draw_hull", "make_hull"]
 
 GRAVITY_M_S2 = 9.81
 """Standard of the vehicle data: weight = mass × 9.81."""
@@ -67,3 +67,25 @@ def make_hull(vehicle: VehicleCfg, clearance_m: float) -> Records[Hull]:
         growth_1_s=0.0,
         moment_m=np.zeros(3),
     ).packed()
+
+
+def draw_hull(hull: Records[Hull], vehicle: VehicleCfg, spread: float, rng: np.random.Generator) -> None:
+    """Give a hull (1,) coefficients about the published ones, in place.
+
+    Each damping and lift coefficient gets a factor e^(σ n) of its own, n normal. Added mass, which potential theory
+    knows better, becomes D M_A D with D = diag(e^(σ n / 4)): its entries spread half as much at most, and it stays
+    symmetric and positive.
+
+    Args:
+        hull: takes them.
+        vehicle: whose coefficients.
+        spread: σ; 0 for the published ones themselves.
+        rng: draws the same numbers whatever the spread.
+    """
+    normal = rng.standard_normal((3, 6, 6))
+    factors = np.exp(spread * normal)
+    hull["linear_damping"][0] = vehicle.linear_damping_body * factors[0]
+    hull["quadratic_damping"][0] = vehicle.quadratic_damping_body * factors[1]
+    hull["lift_damping"][0] = vehicle.lift_damping_body * factors[2]
+    scale = np.exp(0.25 * spread * rng.standard_normal(6))
+    hull["added_mass"][0] = vehicle.added_mass_body * np.outer(scale, scale)

@@ -87,6 +87,12 @@ class LandingDock:
         place = (0.0, 0.0, self._place_z_m)
         return Weld(place, (sx, sy, sz), (math.cos(0.5 * roll), math.sin(0.5 * roll), 0.0, 0.0))
 
+    def ground_z_m(self, x_m: float, y_m: float) -> float:
+        """The platform's upper face, beside it the floor."""
+        station = self._station
+        is_above = abs(x_m) <= 0.5 * station.length_m and abs(y_m) <= 0.5 * station.width_m
+        return -station.depth_m if is_above else -station.depth_m - station.height_m
+
     @property
     def latched(self) -> bool:
         """True once the latch has closed."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, cast
 
@@ -14,6 +15,7 @@ from auvdock.core.limits import NotNegative
 from auvdock.numeric.compiled import compiled
 from auvdock.numeric.records import Record, Records
 from auvdock.numeric.scalars import within_pi
+from auvdock.sim.dvl import Dvl, DvlCfg
 
 __all__ = ["SensorCfg", "Sensors"]
 
@@ -44,6 +46,8 @@ class SensorCfg(Checked):
     """DVL water track: shorter cells and fewer scatterers, some three times the bottom lock's."""
     velocity_scale_error: NotNegative = 0.002
     """DVL scale error (same data sheet: ±0.2 %)."""
+    dvl: DvlCfg = DvlCfg()
+    """When the DVL measures."""
     contact_threshold_n: NotNegative = 5.0
     """Force that closes the touch switch: the bow's, in landing the underside's."""
 
@@ -73,6 +77,7 @@ class Sensors:
     def __init__(self, cfg: SensorCfg) -> None:
         """Prepare; call `reset` before use."""
         self._cfg = cfg
+        self._dvl = Dvl(cfg.dvl)
         self._std = Readings(
             cfg.depth_noise_m,
             np.array([cfg.attitude_noise_rad, cfg.attitude_noise_rad, cfg.heading_noise_rad]),
@@ -92,6 +97,7 @@ class Sensors:
     def reset(self, rng: np.random.Generator, compass_datum_rad: float = 0.0) -> None:
         """Draw this episode's biases; `rng` then belongs to the sensors, and the datum is added to the compass."""
         self._rng = rng
+        self._dvl.reset(rng.spawn(1)[0])  # its lost pings leave the other draws as they were
         self._datum_rad = compass_datum_rad
         drawn, self._bias = _normal(rng, 1), Readings.zeros()
         for name in Readings.dtype().names or ():
@@ -108,8 +114,12 @@ class Sensors:
         nu_relative_body: Array,
         switch_force_n: float,
         latched: bool,
+        height_m: float = math.inf,
     ) -> Proprioception:
-        """One sample of all sensors; depth in m, angles (3,) in rad, velocities (6,) in m/s and rad/s."""
+        """One sample of all sensors; depth in m, angles (3,) in rad, velocities (6,) in m/s and rad/s.
+
+        `height_m` is that of the DVL above what lies below it.
+        """
         if self._row == _BLOCK:
             self._noise, self._row = _normal(self._rng, _BLOCK), 0
         noise, said = self._noise[self._row : self._row + 1], Readings.zeros()
@@ -117,15 +127,21 @@ class Sensors:
         _read(
             said, self._bias, self._std, noise, euler_zyx_rad, nu_body, nu_relative_body, self._scale, self._datum_rad
         )
+        euler_rad: Array = said["euler_zyx_rad"][0]
+        log = self._dvl.sample(
+            time_s, height_m, euler_rad, said["velocity_ground_m_s"][0], said["velocity_water_m_s"][0]
+        )
         return Proprioception(
             time_s=time_s,
             depth_m=depth_m + float(said["depth_m"][0]),
-            euler_zyx_rad=said["euler_zyx_rad"][0],
+            euler_zyx_rad=euler_rad,
             angular_velocity_rad_s=said["angular_velocity_rad_s"][0],
-            velocity_ground_m_s=said["velocity_ground_m_s"][0],
-            velocity_water_m_s=said["velocity_water_m_s"][0],
+            velocity_ground_m_s=log.ground_m_s,
+            velocity_water_m_s=log.water_m_s,
             contact=switch_force_n > self._cfg.contact_threshold_n,
             latched=latched,
+            ground_age_s=log.ground_age_s,
+            water_age_s=log.water_age_s,
         )
 
 

@@ -12,6 +12,7 @@ from auvdock.core.arrays import Array, check_shape
 from auvdock.core.checked import Checked
 from auvdock.core.contracts import Proprioception
 from auvdock.core.limits import between
+from auvdock.core.marine import flip_vector
 from auvdock.core.stations import StationCfg
 from auvdock.core.transforms import make_transform, rotation_from_quat_wxyz
 from auvdock.core.vehicle import VehicleCfg, load_vehicle
@@ -20,7 +21,7 @@ from auvdock.sim.actuation import make_actuators
 from auvdock.sim.contacts import Contacts
 from auvdock.sim.dock import Weld
 from auvdock.sim.docks import make_dock
-from auvdock.sim.hydrodynamics import make_hull
+from auvdock.sim.hydrodynamics import draw_hull, make_hull
 from auvdock.sim.immersion import clearance_m, cut_hull, immerse
 from auvdock.sim.kinematics import Kinematics, kinematics
 from auvdock.sim.mj import MjData, addresses, mujoco
@@ -41,6 +42,11 @@ class SimCfg(Checked):
 
     vehicle: str = "remus_hybrid"
     """Vehicle preset."""
+    battery_v: Annotated[float, between(10.0, 20.0)] | None = None
+    """Voltage of thrusters with measured curves, in place of the vehicle's own."""
+    coefficient_spread: Annotated[float, between(0.0, 0.5)] = 0.0
+    """Standard deviation of the natural logarithm of each hydrodynamic coefficient of the flown hull over the published
+    one, drawn each episode (`hydrodynamics.draw_hull`); the pilot knows the published ones."""
     current: CurrentCfg = CurrentCfg()
     sensors: SensorCfg = SensorCfg()
     physics_hz: Annotated[float, between(100.0, 2000.0, "contacts need some 100 Hz")] = 120.0
@@ -86,18 +92,20 @@ class Simulator:
         """
         self.cfg = cfg
         self.station = station
-        self.vehicle = vehicle if vehicle is not None else load_vehicle(cfg.vehicle)
+        self.vehicle = vehicle if vehicle is not None else load_vehicle(cfg.vehicle, cfg.battery_v)
         self._dt_s = 1.0 / cfg.physics_hz
         self._dock = make_dock(station, self.vehicle)
         self.model = build_model(self.vehicle, self._dock, self._dt_s)
         self._data = mujoco.MjData(self.model)
         self.T_world_station = make_transform(np.eye(3), np.array([0.0, 0.0, -station.depth_m]))
         self._actuators = make_actuators(self.vehicle, self._dt_s)
+        self._is_metered = bool(self._actuators["has_curve"].any())
         self._pieces = cut_hull(self.vehicle)
         self._clearance_m = clearance_m(self._pieces, self._actuators)
         self._hull = make_hull(self.vehicle, self._clearance_m)
         self._ocean = Ocean(cfg.current, station.depth_m, self._dt_s)
         self._sensors = Sensors(cfg.sensors)
+        self._log_body_m = flip_vector(np.array(self.vehicle.belly_camera.position_m))
         self._contacts = Contacts(self.model, self._data, self.vehicle.nose_x_m, self.vehicle.radius_m)
         self._weld = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_EQUALITY, LATCH)
         self._body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, VEHICLE)
@@ -156,7 +164,7 @@ class Simulator:
         Args:
             position_world_m: (3,) of the body frame's origin.
             quat_wxyz: (4,) of the body frame; normalised here.
-            rng: spawns one generator for the water and one for the sensors.
+            rng: spawns a generator for the water, one for the sensors and one for the hull's coefficients.
             current: in place of the configured one, for this episode.
             nu_relative_body: (6,) velocity through the water, body axes, m/s and rad/s; None is at rest.
             compass_datum_rad: added to every compass reading of the episode.
@@ -172,10 +180,11 @@ class Simulator:
         nu = np.zeros(6) if nu_relative_body is None else nu_relative_body
         check_shape("nu_relative_body", nu, (6,))
         qpos = np.concatenate([position_world_m, quat_wxyz / length]).astype(np.float64)
-        run = Run(self._dt_s, self._dock.watch, qpos[:3], 0, 0.0, 0.0).packed()
+        run = Run(self._dt_s, self._dock.watch, qpos[:3], 0, 0.0, 0.0, 0.0).packed()
         if is_absurd(qpos, nu.astype(np.float64), run):
             raise ValueError(f"cannot start at {position_world_m} with {nu}")
-        water_rng, sensor_rng = rng.spawn(2)
+        water_rng, sensor_rng, hull_rng = rng.spawn(3)
+        draw_hull(self._hull, self.vehicle, self.cfg.coefficient_spread, hull_rng)
         mujoco.mj_resetData(self.model, self._data)
         self._ocean.reset(current if current is not None else self.cfg.current, water_rng)
         self._sensors.reset(sensor_rng, compass_datum_rad)
@@ -285,6 +294,7 @@ class Simulator:
             entry_lateral_m=entry.lateral_m if entry else None,
             entry_vertical_m=entry.vertical_m if entry else None,
             energy_j=float(self._run["work_j"][0]),
+            electrical_j=float(self._run["electrical_j"][0]) if self._is_metered else None,
             path_length_m=float(self._run["path_m"][0]),
             immersed_share=float(self._hull["immersed"][0]),
             broached_s=self._broached_s,
@@ -308,7 +318,13 @@ class Simulator:
             moving["nu_relative_body"][0],
             force_n,
             self._dock.latched,
+            self._log_height_m(pose),
         )
+
+    def _log_height_m(self, T_world_body: Array) -> float:
+        """Height of the DVL, which sits beside the belly camera, above what lies below it."""
+        x, y, z = (T_world_body[:3, 3] + T_world_body[:3, :3] @ self._log_body_m).tolist()
+        return z - self._dock.ground_z_m(x, y)
 
     def _kinematics(self, out: Records[Kinematics]) -> None:
         """Write `kinematics` of the present state."""

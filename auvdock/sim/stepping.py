@@ -30,6 +30,7 @@ __all__ = [
     "Snapshot",
     "add_mass",
     "advance",
+    "electrical_power_w",
     "hydraulic_power_w",
     "is_absurd",
     "record",
@@ -81,6 +82,8 @@ class Run(Record):
     """Made since then."""
     work_j: float
     """Hydraulic work of the thrusters since then."""
+    electrical_j: float
+    """Electrical work of those whose power was measured."""
     path_m: float
     """Length of the path since then."""
 
@@ -150,6 +153,7 @@ def advance(
         path_m = math.sqrt(qvel[0] ** 2 + qvel[1] ** 2 + qvel[2] ** 2) * now.dt_s
         _mj_step2(joint.model, joint.data)
         now.work_j += hydraulic_power_w(actuators) * now.dt_s
+        now.electrical_j += electrical_power_w(actuators) * now.dt_s
         now.path_m += path_m
         now.steps += 1
         made += 1
@@ -210,15 +214,44 @@ def _is_watched(qpos: Array, watch: Watch) -> bool:
 def respond(actuators: Records[Actuator]) -> None:
     """Advance the actuators' states by one step: clip to [-1, 1], 0 inside the dead band, then τ ẋ + x = c.
 
+    By a measured curve x follows the effort at c in place of c.
+
     Args:
         actuators: (n,) whose commands c are numbers; their states x are advanced in place.
     """
     for i in range(len(actuators)):
         actuator = actuators[i]
         value = min(max(actuator.command, -1.0), 1.0)
-        if -actuator.dead_band < value < actuator.dead_band:
+        if actuator.has_curve:
+            value = _between(actuator.curve_command, actuator.curve_effort, value)
+        elif -actuator.dead_band < value < actuator.dead_band:
             value = 0.0
         actuator.state += actuator.lag * (value - actuator.state)
+
+
+@compiled
+def _between(nodes: Array, values: Array, at: float) -> float:
+    """A function (n,) that is straight between its growing nodes (n,), at a number within them."""
+    low, high = 0, len(nodes) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if nodes[middle] <= at:
+            low = middle
+        else:
+            high = middle
+    width = nodes[high] - nodes[low]
+    return values[low] + (values[high] - values[low]) * ((at - nodes[low]) / width if width > 0.0 else 0.0)
+
+
+@compiled
+def electrical_power_w(actuators: Records[Actuator]) -> float:
+    """Electrical power of those thrusters (n,) that have a curve, at their commands: as measured in still water."""
+    power = 0.0
+    for i in range(len(actuators)):
+        actuator = actuators[i]
+        if actuator.has_curve:
+            power += _between(actuator.curve_command, actuator.curve_power_w, min(max(actuator.command, -1.0), 1.0))
+    return power
 
 
 @compiled

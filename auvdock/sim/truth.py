@@ -58,7 +58,8 @@ class Truth(NamedTuple):
         entry_lateral_m: sideways offset of the nose from the tube's axis at that moment, + to the right as the
             entering vehicle sees it; None before.
         entry_vertical_m: upward offset at that moment; None before.
-        energy_j: hydraulic work of the thrusters so far (`Actuators.power_w`).
+        energy_j: hydraulic work of the thrusters so far (`stepping.hydraulic_power_w`).
+        electrical_j: their electrical work so far; None where no thruster has a measured curve.
         path_length_m: distance over ground so far.
         immersed_share: share of the hull's displaced volume that is under water.
         broached_s: time so far in which some of it was not.
@@ -88,6 +89,7 @@ class Truth(NamedTuple):
     broached_s: float
     diverged: bool
     landing: LandingTruth | None = None
+    electrical_j: float | None = None
 
     @property
     def to_go_m(self) -> float:

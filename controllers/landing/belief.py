@@ -16,6 +16,7 @@ from auvdock.core.transforms import invert
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.estimation.landing.percept import LandingPercept
 from auvdock.estimation.senses import Senses, Vector, cross
+from auvdock.numeric.motion import stale_walk_m2_s
 
 __all__ = ["Belief", "BeliefReader"]
 
@@ -44,7 +45,7 @@ class BeliefReader:
     """Takes the pose of each percept as it is: perception's measurements were filtered once, in `estimation`.
 
     In control periods without a pose the place moves with the DVL, p ← p + R_station_body (v + ω × r_seat) dt, and its
-    variance grows as a random walk's.
+    variance grows as a random walk's, the more the longer the DVL has had no bottom lock.
     """
 
     def __init__(
@@ -99,6 +100,6 @@ class BeliefReader:
         dt, place = self._dt_s, belief.place
         return belief._replace(
             place=Place(place.ahead_m + x * dt, place.port_m + y * dt, place.height_m + z * dt, heading),
-            variance_m2=belief.variance_m2 + self._walk_m2,
+            variance_m2=belief.variance_m2 + self._walk_m2 + stale_walk_m2_s(senses.ground_age_s) * dt,
             since_fix_s=belief.since_fix_s + dt,
         )

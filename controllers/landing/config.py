@@ -28,6 +28,8 @@ class HoverDesignCfg(DesignCfg):
     """Gain crossover of the sway velocity loop."""
     velocity_margin_deg: PhaseMargin = 60.0
     """Phase margin for which the velocity loops are designed."""
+    attitude_margin_deg: PhaseMargin = 52.0
+    """Phase margin for which the attitude loops are designed."""
     pitch_crossover_rad_s: Crossover = 2.5
     """Gain crossover of the pitch loop."""
     roll_crossover_rad_s: Crossover = 2.5

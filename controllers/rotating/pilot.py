@@ -176,7 +176,7 @@ class RotatingPilot:
         )
         beacon = state.beacon
         if beacon is not None:
-            beacon = self._filter.predict(beacon, (east, north))
+            beacon = self._filter.predict(beacon, (east, north), senses.ground_age_s)
         return state._replace(trail=(*state.trail[-_TRAIL:], now), beacon=beacon)
 
     def _sight(self, state: RotatingState, fix: AzimuthFix, senses: Senses) -> RotatingState:

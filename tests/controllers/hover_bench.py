@@ -16,7 +16,7 @@ from auvdock.sim.simulator import SimCfg, Simulator
 VEHICLES = {name: load_vehicle(name) for name in ("bluerov2_heavy", "remus_hybrid")}
 DT_S = 1.0 / 20.0
 STEPS = 6
-QUIET = SensorCfg(**{field.name: 0.0 for field in dataclasses.fields(SensorCfg)})
+QUIET = SensorCfg(**{field.name: 0.0 for field in dataclasses.fields(SensorCfg) if field.name != "dvl"})
 
 
 class Hoverer:

@@ -27,8 +27,10 @@ ROWS = {"surge": 0, "sway": 1, "heave": 2, "roll": 3, "pitch": 4, "heading": 5}
 GAINS = {name: design_gains(vehicle, HoverDesignCfg(), DT_S) for name, vehicle in VEHICLES.items()}
 PUBLISHED = VEHICLES["bluerov2_heavy"]
 ROV = dataclasses.replace(
-    PUBLISHED, actuators=tuple(dataclasses.replace(actuator, dead_band=0.0) for actuator in PUBLISHED.actuators)
+    PUBLISHED,
+    actuators=tuple(dataclasses.replace(actuator, curve="", max_force_n=30.0) for actuator in PUBLISHED.actuators),
 )
+"""With thrust proportional to the command."""
 ALLOCATOR = ThrustAllocator(ROV)
 
 
@@ -123,11 +125,25 @@ def test_moments_first_keeps_attitude_and_gives_forces_in_their_direction(wrench
         np.testing.assert_allclose(achieved[:3], share * wrench[:3], atol=1e-5)
 
 
+@given(command=commands)
+@settings(max_examples=60, deadline=None)
+def test_measured_curves_are_inverted(command):
+    """The T200's thrust at the commands is the wrench that was asked for, however weak."""
+    wrench = PUBLISHED.thruster_wrenches_body @ command
+    given_command, achieved = ThrustAllocator(PUBLISHED).solve(wrench, 0.0)
+    assert np.abs(given_command).max() <= 1.0
+    np.testing.assert_allclose(PUBLISHED.thruster_wrenches_body @ PUBLISHED.efforts(given_command), wrench, atol=1e-6)
+    np.testing.assert_allclose(achieved, wrench, atol=1e-6)
+
+
 def test_preload_changes_no_wrench_and_lifts_weak_ones_out_of_the_dead_band():
     """The dead band of 0.4 N swallows a pull of 0.5 N; with the preload it arrives (heave: against the buoyancy)."""
-    plain, loaded = ThrustAllocator(PUBLISHED), ThrustAllocator(PUBLISHED, HoverAllocationCfg())
+    banded = dataclasses.replace(
+        ROV, actuators=tuple(dataclasses.replace(actuator, dead_band=0.0133) for actuator in ROV.actuators)
+    )
+    plain, loaded = ThrustAllocator(banded), ThrustAllocator(banded, HoverAllocationCfg())
     for wrench in np.array([[0.5, 0.0, -2.3, 0.0, 0.0, 0.0], [0.3, 0.6, -2.3, 0.0, 0.0, 0.05]]):
-        given_wrench = PUBLISHED.thruster_wrenches_body @ loaded.allocate(wrench, 0.0)
+        given_wrench = banded.thruster_wrenches_body @ loaded.allocate(wrench, 0.0)
         np.testing.assert_allclose(given_wrench, wrench, atol=1e-6)
     assert not plain.allocate(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]), 0.0)[:4].any()
     big = np.array([84.0, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -102,3 +102,15 @@ def test_rubbish_is_no_pose():
         assert after is not None
         assert np.isfinite(after.place).all()
         assert after.since_fix_s == DT_S
+
+
+def test_without_bottom_lock_the_doubt_grows_faster():
+    grown = []
+    for age_s in (0.0, 0.3, 3.0):
+        old = senses(0.0).motion.copy()
+        old["ground_age_s"] = age_s
+        belief = READER.advance(None, percept(0.0), senses(0.0))
+        belief = READER.advance(belief, None, senses(0.0)._replace(motion=old))
+        assert belief is not None
+        grown.append(belief.variance_m2)
+    assert grown[0] < grown[1] < grown[2]

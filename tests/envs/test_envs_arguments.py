@@ -82,7 +82,7 @@ def test_success_is_paid_once() -> None:
     env = DockingEnv(start=start, reward={"progress_per_m": 0.0, "energy_per_j": 0.0})
     env.reset(seed=0)
     ahead = np.zeros(7)
-    ahead[0] = 0.25
+    ahead[0] = 0.3
     total = 0.0
     for _ in range(900):
         _, reward, terminated, _, info = env.step(ahead)

@@ -69,7 +69,8 @@ def test_whatever_a_landing_wrapper_is_told_stays_within_the_actuators(wrapper, 
     for _ in range(10):
         assert env.unwrapped.action_space.contains(env.action(env.action_space.sample()))
     up = env.action(np.eye(env.action_space.shape[0], dtype=np.float32)[2])
-    force = up @ env.unwrapped.world.simulator.vehicle.thruster_wrenches_body.T
+    flown = env.unwrapped.world.simulator.vehicle
+    force = flown.efforts(up) @ flown.thruster_wrenches_body.T
     assert force[2] > 0.9 * np.abs(force).max()
 
 

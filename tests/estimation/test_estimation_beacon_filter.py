@@ -149,3 +149,16 @@ def test_configuration_refuses_nonsense():
         BeaconFilterCfg(min_range_m=80.0)
     with pytest.raises(ConfigError, match="bearing_floor_rad"):
         BeaconFilterCfg(bearing_floor_rad=0.0)
+
+
+def test_a_way_by_old_velocities_is_doubted_until_the_next_fix():
+    state = FILTER.start(sighting((20.0, 0.0), 0.0))
+    assert state is not None
+    fresh = stale = state
+    for _ in range(60):
+        fresh, stale = FILTER.predict(fresh, (0.5, 0.0)), FILTER.predict(stale, (0.5, 0.0), 0.5)
+    assert fresh.stale_m2 == 0.0
+    assert stale.stale_m2 == pytest.approx(60 * DT_S * 2.0 * 0.075**2 * 0.5)
+    fix = sighting((20.0 - 30.0 * DT_S, 0.0), 0.0)
+    assert FILTER.update(stale, fix).stale_m2 == 0.0
+    assert FILTER.update(stale, fix).cross_sigma_m >= FILTER.update(fresh, fix).cross_sigma_m

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.stats import chi2
 
 from auvdock.core.arrays import Array
 from auvdock.core.contracts import Proprioception
-from auvdock.core.transforms import rotation_from_euler_zyx
+from auvdock.core.transforms import make_transform, rotation_from_euler_zyx
 from auvdock.estimation.landing.estimator import LandingEstimator
 from auvdock.estimation.landing.filter import LandingFilter
 from auvdock.estimation.landing.fusion import agree, weighted_mean
@@ -159,3 +160,17 @@ def test_levels_that_disagree():
     lights = level(T, LIGHTS, 0.1, T[:3, :3], rng)
     assert agree(lights, level(T, CORNERS, 0.1, T[:3, :3], rng), 27.9)
     assert not agree(lights, level(moved, CORNERS, 0.1, T[:3, :3], rng), 27.9)
+
+
+def test_without_bottom_lock_the_covariance_grows_faster():
+    """One second by a velocity 0.3 s old: 2 (0.15 × 0.3)² 0.3 m² more variance of each coordinate."""
+    flight = Descent(np.array([0.0, 0.0, 3.0]), 0.0, 0.5, 2.5)
+    start = Senses(flight, np.random.default_rng(0)).proprioception(0.0)
+    ahead: list[Array] = []
+    for age_s in (0.0, 0.3):
+        found = LandingFilter(FilterCfg(), AttitudeCfg(), CAMERA)
+        found.place(make_transform(measured_attitude(start), np.array([0.0, 0.0, 3.0])), 1e-4 * np.eye(6), start)
+        expected = found.expected(dataclasses.replace(start, time_s=1.0, ground_age_s=age_s))
+        assert expected is not None
+        ahead.append(np.diag(expected[1])[:3])
+    np.testing.assert_allclose(ahead[1] - ahead[0], 2.0 * 0.045**2 * 0.3, rtol=1e-6)

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from sim_bench import REMUS, command, run, simulator, start, state, trimmed
 
 from auvdock.core.arrays import Array
+from auvdock.core.vehicle import load_vehicle
 from auvdock.numeric.records import Records
 from auvdock.sim.actuation import Actuator, make_actuators
-from auvdock.sim.stepping import hydraulic_power_w, respond
+from auvdock.sim.stepping import electrical_power_w, hydraulic_power_w, respond
 
 
 def make(dt_s: float = 1.0 / 120.0) -> Records[Actuator]:
@@ -94,6 +95,29 @@ def test_power_is_never_negative() -> None:
     for _ in range(500):
         step(actuators, rng.uniform(-1.0, 1.0, 7))
         assert power_w(actuators, rng.uniform(-3.0, 3.0, 7)) >= 0.0
+
+
+@given(st.lists(st.floats(-1.2, 1.2), min_size=8, max_size=8))
+@settings(deadline=None, max_examples=50)
+def test_measured_thrusters_settle_at_their_curve(commands: list[float]) -> None:
+    """After a long step at the effort, thrust and power that NumPy's interpolation gives."""
+    rov = load_vehicle("bluerov2_heavy")
+    actuators = make_actuators(rov, 100.0)
+    bounded = np.clip(commands, -1.0, 1.0)
+    np.testing.assert_allclose(step(actuators, commands), rov.efforts(bounded), atol=1e-12)
+    curve = rov.curve(rov.actuators[0])
+    assert curve is not None
+    expected = np.interp(bounded, curve.command, curve.power_w).sum()
+    assert electrical_power_w(actuators) == pytest.approx(expected, rel=1e-12)
+
+
+def test_electrical_work_is_told_where_it_was_measured() -> None:
+    """One second of one thruster at 1700 µs and 16 V: 73.3 W (Blue Robotics); the torpedo's was not measured."""
+    sim = simulator(load_vehicle("bluerov2_heavy", 16.0))
+    start(sim)
+    run(sim, 1.0, command(sim, fore_port=0.5))
+    assert sim.truth.electrical_j == pytest.approx(73.3, rel=0.002)
+    assert simulator().truth.electrical_j is None
 
 
 def test_fin_turns_the_hull_the_way_it_stands_and_not_at_rest() -> None:

@@ -38,7 +38,9 @@ def thrust_down(sim: Simulator, force_n: float) -> Array:
     """The command of least norm for a downward force."""
     thrusters = [actuator.kind == "thruster" for actuator in sim.vehicle.actuators]
     wrenches = sim.vehicle.thruster_wrenches_body * np.array(thrusters)
-    return np.asarray(np.linalg.pinv(wrenches) @ np.array([0.0, 0.0, -force_n, 0.0, 0.0, 0.0]), dtype=np.float64)
+    efforts = np.linalg.pinv(wrenches) @ np.array([0.0, 0.0, -force_n, 0.0, 0.0, 0.0])
+    curves = [sim.vehicle.curve(actuator) for actuator in sim.vehicle.actuators]
+    return np.array([e if curve is None else curve.command_for(e) for e, curve in zip(efforts, curves, strict=True)])
 
 
 def descend(sim: Simulator, force_n: float, seconds: float) -> bool:

@@ -144,7 +144,7 @@ def test_left_alone_a_light_vehicle_comes_to_rest_displacing_its_weight(vehicle:
     sim = simulator(light(vehicle, share))
     start(sim, (30.0, 0.0, -0.6), (10.0, 5.0, 0.0))
     still, highest = np.zeros(len(vehicle.actuators)), -1.0
-    for _ in range(90):
+    for _ in range(200):
         run(sim, 0.5, still)
         highest = max(highest, float(sim.truth.T_world_body[2, 3]))
     assert abs(sim.truth.nu_body[2]) < 5e-3

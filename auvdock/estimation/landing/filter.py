@@ -31,6 +31,7 @@ from auvdock.core.transforms import (
     rotation_from_euler_zyx,
     wrap_angle,
 )
+from auvdock.numeric.motion import stale_walk_m2_s
 from auvdock.perception.landing.config import AttitudeCfg, FilterCfg
 from auvdock.perception.landing.level import LevelPose, pose_offset
 
@@ -213,6 +214,7 @@ class LandingFilter:
         # The trapezoid shares each sample between two steps, so the white error of a step is one sample's.
         step = (cfg.velocity_noise_m_s**2 + 0.5 * cfg.gyro_noise_rad_s**2 * float(self._arm_m @ self._arm_m)) * dt * dt
         step += cfg.velocity_scale_error**2 * speed2 * dt * _CORRELATION_S
+        step += stale_walk_m2_s(now.ground_age_s) * dt
         turn = cfg.gyro_noise_rad_s**2 * dt * dt + cfg.gyro_bias_rad_s**2 * dt * _CORRELATION_S
         return np.diag([step, step, step, turn, 0.0, 0.0])
 
