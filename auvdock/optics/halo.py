@@ -125,10 +125,6 @@ class HaloTable:
         """(m,) the water's phase function in 1/sr at scattering angles (m,) above 0."""
         return self._phase(angle_rad)
 
-    def block_br(self) -> Array:
-        """(112,) b r of a block's rows; the first stands for 0."""
-        return _rows_br()
-
     def _one(self, rows: Array | NDArray[np.float32], br: float, first_row: int) -> Array:
         depth = np.array([br])
         row, weight = self.row_of(depth, first_row)

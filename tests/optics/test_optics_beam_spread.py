@@ -69,7 +69,7 @@ def test_an_even_lamp_is_unchanged():
 
 def test_far_from_the_axis_light_is_scattered_once_in_thin_water():
     """A narrow beam at θ off: I0 Ω b r ∫ p(θ + φ) dφ / sin θ is what is scattered into the receiver along the beam."""
-    water = WaterCfg("thin", "test", (1e-4,) * 3, (0.01,) * 3)
+    water = WaterCfg("thin", "test", (1e-4, 1e-4, 1e-4), (0.01, 0.01, 0.01))
     table, br = halo_of(water), 0.02
     spread = spread_of(2.0, water)
     for degrees in (20.0, 40.0, 60.0):

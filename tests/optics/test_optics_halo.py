@@ -18,7 +18,8 @@ RATIOS = (0.01, 0.05, 0.14, 0.6, 1.0, 5.0)
 
 
 def water_of(ratio, b=0.2):
-    return WaterCfg("test", "test", (ratio * b,) * 3, (b,) * 3)
+    a = ratio * b
+    return WaterCfg("test", "test", (a, a, a), (b, b, b))
 
 
 @settings(max_examples=60, deadline=None)
