@@ -122,7 +122,7 @@ class WaterDraw(Checked):
         clearest = min(_absorption_per_m(name, f"names[{k}]") for k, name in enumerate(self.names))
         if self.attenuation_per_m[0] < clearest / 0.8:
             remedy = f"{clearest / 0.8:.3g} 1/m or more: absorption takes up to four fifths of it in the clearest water"
-            raise ConfigError("attenuation_per_m[0]", self.attenuation_per_m[0], remedy)
+            raise ConfigError("attenuation_per_m", self.attenuation_per_m, f"a first number of {remedy}")
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,10 @@ from auvdock.core.magnitudes import unit_of
 from auvdock.core.reader import hints_of
 from auvdock.core.strict import load_toml
 from auvdock.core.vehicle import VehicleCfg
+from auvdock.dataset.config import load_dataset_cfg
 from auvdock.episode.stations import STATIONS
+from auvdock.footage.camera_file import PixelCameraCfg
+from auvdock.networks.catalog import ModelCfg, load_model, model_names
 from auvdock.optics.detection_model import DetectionModelCfg
 from auvdock.optics.tag_model import TagModelCfg
 from auvdock.optics.water import load_water
@@ -60,6 +63,10 @@ for whole in (
     load_toml(DetectionModelCfg, asset("detection", asset_names("detection")[0])),
     load_toml(TagModelCfg, asset("tag_detection", asset_names("tag_detection")[0])),
     load_water("lake"),
+    load_dataset_cfg(),
+    *(load_model(name) for name in model_names()),
+    ModelCfg("yolov8n"),
+    PixelCameraCfg(640, 480, (500.0, 500.0), (320.0, 240.0)),
     AxisCfg("current", (0.1, 0.2)),
 ):
     SAMPLES.update((type(part), part) for part in within(whole))

@@ -26,7 +26,7 @@ def seen(place: Place, seed: int) -> Watch:
 
 
 def equal(flight: Flight, other: Flight) -> bool:
-    clock = {"wall_s": 0.0, "real_time_factor": 0.0}
+    clock = dict.fromkeys(EpisodeResult.WALL_CLOCK_FIELDS, 0.0)
     return flight.path_m == other.path_m and dataclasses.replace(flight.result, **clock) == dataclasses.replace(
         other.result, **clock
     )

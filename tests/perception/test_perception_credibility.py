@@ -96,13 +96,13 @@ def test_a_range_is_believed_as_far_as_the_span_of_the_lights_tells_it(credibili
         assert credibility.holds(solution) == (share < 0.1), (distance_m, share)
 
 
-@pytest.mark.parametrize("association", ASSOCIATIONS)
+@pytest.mark.parametrize("association", [name for name in ASSOCIATIONS if name != "algorithm_1"])
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), spread_px=st.floats(0.0, 4.0), lights=st.integers(4, 8))
 def test_lights_within_a_few_pixels_are_no_array(
     association: AssociationName, seed: int, spread_px: float, lights: int
 ):
-    """Also with one light given twice (spread 0): never a measured pose."""
+    """Also with one light given twice (spread 0): never a measured pose. Algorithm 1 as printed doubts nothing."""
     rng = np.random.default_rng(seed)
     perception = BeaconPerception(PerceptionCfg(association=association), CAMERA, LAYOUT)
     middle = rng.uniform([20.0, 20.0], [620.0, 340.0])
