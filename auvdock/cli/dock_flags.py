@@ -30,7 +30,7 @@ class DockFlags(ABC):
     """pixels renders every frame; beacons draws detections from the same light model without an image; auto is pixels
     where OpenGL works, else beacons."""
     detector: str | None = None
-    """threshold, blob, cores, halos, or your own as package.module:Name."""
+    """threshold, blob, cores, halos, paper_a_light, or your own as NAME.onnx or package.module:Name."""
     controller: str | None = None
     """A pilot of your own as package.module:Name, in place of the station's."""
     water: str | None = None

@@ -38,7 +38,7 @@ class FitDetector:
     """
 
     detector: Annotated[str, tyro.conf.Positional]
-    """threshold, blob, or your own as package.module:Name."""
+    """threshold, blob, paper_a_light, or your own as NAME.onnx or package.module:Name."""
     out: Path
     """Where to write the model."""
     frames: int = 200

@@ -69,6 +69,10 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "auvdock.cli.reproduce_vehicle:run_vehicle",
         "the vehicles' speeds, stability and turning beside published runs",
     ),
+    ("reproduce", "detection-a"): (
+        "auvdock.cli.reproduce_detection:run_detection_a",
+        "paper A's detection of lights: threshold, blob and its network",
+    ),
     ("bench",): ("auvdock.cli.bench:run", "measure this machine's speed"),
     ("fit-detector",): ("auvdock.cli.fit:run", "fit the beacons fidelity to a detector's behaviour on rendered frames"),
     ("fit-landing",): (
@@ -76,6 +80,7 @@ COMMANDS: dict[tuple[str, ...], tuple[str, str]] = {
         "fit the beacons fidelity of a landing to detectors of lights and tags",
     ),
     ("dataset",): ("auvdock.cli.dataset:run", "render labelled frames for learned detectors"),
+    ("train",): ("auvdock.cli.train:run", "train a detection network on labelled frames"),
     ("export",): ("auvdock.cli.export:run", "write a trained network as an ONNX file"),
     ("doctor",): ("auvdock.cli.doctor:run", "tell what works on this machine and what to install"),
 }

@@ -114,7 +114,7 @@ class Sweep:
     interfering_lights: str | None = None
     """Lights that are not the station's: none, mild, moderate, severe, or several with commas."""
     detector: str | None = None
-    """threshold, blob, your own as package.module:Name, or several with commas."""
+    """threshold, blob, paper_a_light, your own as NAME.onnx or package.module:Name, or several with commas."""
     controller: str | None = None
     """own, a pilot of yours as package.module:Name, or several with commas."""
     axis: tuple[str, ...] = ()

@@ -37,6 +37,12 @@ class FrameLabels(NamedTuple):
     ignored: BoolArray
     c_range: Array
 
+    def select(self, kept: BoolArray) -> FrameLabels:
+        """Some of the labels, `kept` (n,)."""
+        return FrameLabels(
+            self.class_id[kept], self.xyxy[kept], self.centre_px[kept], self.ignored[kept], self.c_range[kept]
+        )
+
 
 class LabelledImage(NamedTuple):
     """A picture (H, W, 3), uint8, RGB, and what is in it."""

@@ -36,7 +36,7 @@ def read_candidates(found: Array, classes: int, min_score: float) -> Candidates:
     rows = np.flatnonzero(scores >= min_score)
     chosen = found[:, rows].T
     centre, half = chosen[:, :2], chosen[:, 2:4] / 2.0
-    points = chosen[:, 4 + classes :].reshape(len(rows), -1, 3)[:, :, :2]
+    points = chosen[:, 4 + classes :].reshape(len(rows), (len(found) - 4 - classes) // 3, 3)[:, :, :2]
     likeliest = chosen[:, 4 : 4 + classes].argmax(axis=1)
     return Candidates(np.hstack((centre - half, centre + half)), scores[rows], likeliest, points)
 
@@ -62,5 +62,5 @@ def decode_cells(said: Array, cells: IntArray, stride_px: int, bins: int) -> tup
     distance = (weights * np.arange(bins)).sum(axis=2) / weights.sum(axis=2)
     middle = cells + 0.5
     box = np.hstack((middle - distance[:, :2], middle + distance[:, 2:])) * stride_px
-    points = said[:, 4 * bins :].reshape(len(said), -1, 3)[:, :, :2]
+    points = said[:, 4 * bins :].reshape(len(said), (said.shape[1] - 4 * bins) // 3, 3)[:, :, :2]
     return box, (2.0 * points + cells[:, None]) * stride_px

@@ -13,20 +13,23 @@ from auvdock.perception.blob import BlobCfg, BlobDetector
 from auvdock.perception.checked_detector import CheckedDetector
 from auvdock.perception.halos import HaloCfg, HaloDetector
 from auvdock.perception.landing.cores import CoreCfg, CoreDetector
+from auvdock.perception.network_detector import NetworkDetector, NetworkDetectorCfg
+from auvdock.perception.network_file import network_names
 from auvdock.perception.threshold import ThresholdCfg, ThresholdDetector
 
 __all__ = ["DETECTORS", "make_detector", "make_station_detector"]
 
 DETECTORS = ("threshold", "blob", "cores", "halos")
-"""Names of the package's own detectors; anything with a colon is looked up as "package.module:Name"."""
+"""The package's own detectors without a network; `network_file.network_names` has those with one. Anything with a colon
+is looked up as "package.module:Name", anything that ends in ".onnx" is a network's file."""
 
 
 def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
     """A detector by name.
 
     Args:
-        name: "threshold", "blob", "cores" (near lights), "halos" (lamps that burn out), or "package.module:Name" for a
-            class or factory of your own.
+        name: "threshold", "blob", "cores" (near lights), "halos" (lamps that burn out), a shipped network
+            ("paper_a_light"), a network's file ("mine.onnx", with its card "mine.toml"), or "package.module:Name" for a class or factory of your own.
         settings: fields of the detector's configuration; keyword arguments of your own class.
 
     Raises:
@@ -40,8 +43,11 @@ def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
         return CoreDetector(_configure(CoreCfg, settings))
     if name == "halos":
         return HaloDetector(_configure(HaloCfg, settings))
+    if name.endswith(".onnx") or name in network_names():
+        return NetworkDetector(name, _configure(NetworkDetectorCfg, settings))
     if ":" not in name:
-        raise ConfigError("detector", name, f"one of {', '.join(DETECTORS)}, or your own as package.module:Name")
+        known = ", ".join((*DETECTORS, *network_names()))
+        raise ConfigError("detector", name, f"one of {known}, or your own as package.module:Name or mine.onnx")
     return _foreign(name, settings)
 
 
@@ -51,7 +57,8 @@ def make_station_detector(name: str, station: ConicalStationCfg) -> Detector:
     Raises:
         ConfigError: as `make_detector`.
     """
-    if station.rotating is not None and name in DETECTORS:
+    own = (*DETECTORS, *network_names())
+    if station.rotating is not None and (name in own or name.endswith(".onnx")):
         return make_detector(name, flux=True)
     return make_detector(name)
 

@@ -41,7 +41,7 @@ class PerceptionCfg(Checked):
     """How the vehicle sees."""
 
     detector: str = "threshold"
-    """"threshold", "blob" or a detector of your own as "package.module:Name"."""
+    """"threshold", "blob", a network ("paper_a_light", "mine.onnx") or one of your own as "package.module:Name"."""
     association: AssociationName = "spatiotemporal"
     """"spatiotemporal" (ours, built on paper A's), "algorithm_1" (paper A's as printed) or "hungarian_ransac" (its
     comparison)."""

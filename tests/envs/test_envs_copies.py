@@ -166,7 +166,7 @@ def test_a_copy_made_while_the_hull_touches_the_station_feels_the_same_contacts(
     assert touched == 3
 
 
-@pytest.mark.parametrize("name", ["threshold", "blob", "cores"])
+@pytest.mark.parametrize("name", ["threshold", "blob", "cores", "paper_a_light"])
 def test_every_detector_can_be_copied(name: str) -> None:
     """OpenCV's own objects can be neither copied nor pickled."""
     detector = make_detector(name)
