@@ -15,7 +15,7 @@ def asset_names(kind: str, ending: str = ".toml") -> tuple[str, ...]:
 
 
 def asset(kind: str, name: str, ending: str = ".toml") -> Traversable:
-    """The file of a preset: TOML, but for the tables of halos (".npz").
+    """The file of a preset: TOML, but for the tables of halos (".npz") and trained networks (".onnx").
 
     Raises:
         ConfigError: no preset of that name; the message lists those that exist.
