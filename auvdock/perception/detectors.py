@@ -29,7 +29,8 @@ def make_detector(name: str, **settings: Any) -> Detector:  # noqa: ANN401
 
     Args:
         name: "threshold", "blob", "cores" (near lights), "halos" (lamps that burn out), a shipped network
-            ("paper_a_light"), a network's file ("mine.onnx", with its card "mine.toml"), or "package.module:Name" for a class or factory of your own.
+            ("paper_a_light"), a network's file ("mine.onnx", with its card "mine.toml"), or "package.module:Name" for a
+            class or factory of your own.
         settings: fields of the detector's configuration; keyword arguments of your own class.
 
     Raises:

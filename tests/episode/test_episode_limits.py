@@ -21,16 +21,18 @@ from auvdock.campaign.axes import AxisCfg
 from auvdock.core.checked import Checked
 from auvdock.core.errors import ConfigError
 from auvdock.core.magnitudes import unit_of
-from auvdock.core.reader import hints_of
-from auvdock.core.strict import load_toml
+from auvdock.core.reader import from_mapping, hints_of
+from auvdock.core.strict import load_toml, read_toml
 from auvdock.core.vehicle import VehicleCfg
 from auvdock.dataset.config import load_dataset_cfg
 from auvdock.episode.stations import STATIONS
 from auvdock.footage.camera_file import PixelCameraCfg
 from auvdock.networks.catalog import ModelCfg, load_model, model_names
+from auvdock.networks.schedule import ScheduleCfg
 from auvdock.optics.detection_model import DetectionModelCfg
 from auvdock.optics.tag_model import TagModelCfg
 from auvdock.optics.water import load_water
+from auvdock.perception.network_file import NetworkCardCfg, network_names
 
 for found in pkgutil.walk_packages(auvdock.__path__, "auvdock."):
     if not found.name.endswith("__main__"):
@@ -67,6 +69,8 @@ for whole in (
     *(load_model(name) for name in model_names()),
     ModelCfg("yolov8n"),
     PixelCameraCfg(640, 480, (500.0, 500.0), (320.0, 240.0)),
+    from_mapping(ScheduleCfg, read_toml(asset("networks/schedules", "default"))["schedule"], "schedule."),
+    load_toml(NetworkCardCfg, asset("networks/weights", network_names()[0])),
     AxisCfg("current", (0.1, 0.2)),
 ):
     SAMPLES.update((type(part), part) for part in within(whole))
