@@ -133,5 +133,5 @@ def flown_beam(halo: HaloTable, br: float, beam_deg: float, off_axis_rad: Array)
 
 def _water(phase: str, absorption: float, theta0_rad: float = 0.05) -> WaterCfg:
     """A water with b = 1 1/m, a phase function, a / b, and θ0 for Wells' model."""
-    each = (absorption,) * 3
-    return WaterCfg("check", "made up", each, (1.0,) * 3, phase_function=phase, scattering_angle_rad=theta0_rad)
+    a, b = (absorption, absorption, absorption), (1.0, 1.0, 1.0)
+    return WaterCfg("check", "made up", a, b, phase_function=phase, scattering_angle_rad=theta0_rad)

@@ -6,6 +6,7 @@ import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from auvdock.core.errors import ConfigError
 def row(spec, success, reason="near"):
     """A row with plausible figures that follow from the episode's seed."""
     part = spec.seed / 2**53
-    drawn = {name: kind(part * 100) for name, kind in RESULT_COLUMNS.items() if kind in (int, float)}
+    drawn: dict[str, Any] = {name: kind(part * 100) for name, kind in RESULT_COLUMNS.items() if kind in (int, float)}
     drawn["poses_by_solver"] = json.dumps({"sqpnp": int(part * 100)})
     outcome = {"success": success, "failure_reason": None if success else reason}
     ordered = {name: outcome[name] if name in outcome else drawn[name] for name in RESULT_COLUMNS}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,8 @@ class Boat:
     """The simulator behind noiseless sensors, far from the station and heading away from it unless told otherwise."""
 
     def __init__(self, yaw_rad=0.0, current_m_s=0.0, direction_deg=0.0, position_m=(30.0, 0.0, -8.0)):
-        quiet = SensorCfg(**{field.name: 0.0 for field in dataclasses.fields(SensorCfg) if field.name != "dvl"})
+        none: dict[str, Any] = {field.name: 0.0 for field in dataclasses.fields(SensorCfg) if field.name != "dvl"}
+        quiet = SensorCfg(**none)
         self.simulator = Simulator(SimCfg(sensors=quiet), STATION)
         self.simulator.reset(
             np.array(position_m),

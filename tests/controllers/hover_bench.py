@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from auvdock.sim.simulator import SimCfg, Simulator
 VEHICLES = {name: load_vehicle(name) for name in ("bluerov2_heavy", "remus_hybrid")}
 DT_S = 1.0 / 20.0
 STEPS = 6
-QUIET = SensorCfg(**{field.name: 0.0 for field in dataclasses.fields(SensorCfg) if field.name != "dvl"})
+_NONE: dict[str, Any] = {field.name: 0.0 for field in dataclasses.fields(SensorCfg) if field.name != "dvl"}
+QUIET = SensorCfg(**_NONE)
 
 
 class Hoverer:

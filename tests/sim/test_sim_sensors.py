@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from auvdock.sim.ocean import CurrentCfg
 from auvdock.sim.sensors import SensorCfg, Sensors
 from auvdock.sim.simulator import SimCfg, Simulator
 
-QUIET = SensorCfg(**{name: 0.0 for name in vars(SensorCfg()) if name != "dvl"})
+_NONE: dict[str, Any] = {name: 0.0 for name in vars(SensorCfg()) if name != "dvl"}
+QUIET = SensorCfg(**_NONE)
 EULER = np.array([0.02, -0.03, 3.1])
 NU = np.array([0.5, 0.1, -0.05, 0.01, 0.02, 0.1])
 NU_RELATIVE = np.array([0.4, 0.2, -0.05, 0.01, 0.02, 0.1])
